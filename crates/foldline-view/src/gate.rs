@@ -1,4 +1,4 @@
-//! Checks that every request passes before its path is looked at.
+//! Checks that every request passes before its path is examined.
 //!
 //! **Idea.** Any page in the browser can send requests to a server on the same computer, and a hostile name server can
 //! make its own host name point here. A request must therefore name this server as its host, must not come from

@@ -16,6 +16,7 @@ mod describe;
 mod frame;
 mod gate;
 mod html;
+mod log;
 mod orbit;
 mod page;
 mod query;

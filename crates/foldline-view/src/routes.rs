@@ -36,7 +36,7 @@ const STREAMS: usize = 4;
 const LONGEST: Duration = Duration::from_secs(10);
 /// Interval between two signs of life on an event stream.
 const ALIVE: Duration = Duration::from_secs(15);
-/// Shortest interval between two looks at the file of a growing run, and at one that nobody writes.
+/// Shortest interval between two looks at the file of a growing run, and at one that is not being written.
 const LOOKS: [Duration; 2] = [Duration::from_millis(100), Duration::from_millis(500)];
 
 /// Security headers of every answer. No `Access-Control` header exists.
@@ -75,7 +75,7 @@ impl Routes {
         Routes { gate, watch, notices, streams: Arc::default() }
     }
 
-    /// Answers a request. Nothing of it is looked at before it has passed the gate.
+    /// Answers a request. Nothing of it is examined before it has passed the gate.
     pub(crate) async fn answer(&self, request: Request<Incoming>) -> Response<Answer> {
         let (parts, _) = request.into_parts();
         let answer = match self.gate.check(&parts) {

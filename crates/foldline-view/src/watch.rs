@@ -1,26 +1,22 @@
 //! A run that is watched through its file.
 //!
-//! **Idea.** The file says which positions each branch has. What is new since the last look is appended to a list of
-//! stretches, and the index of a point in this list is its cursor: a client that has N points asks for those from N
-//! on. If anything was removed, as when a run is resumed, the list starts again in a new *epoch*. The numbers stay in
-//! the file. The file is opened for each look and closed at once (`foldline_store::run_file`).
+//! **Idea.** The file says which positions each branch has; `log` numbers them in the order in which they were first
+//! seen. The numbers of the points stay in the file, which is opened for each look and closed at once (`foldline_store::run_file`).
 
 use crate::describe::{described, state};
 use crate::frame::frame;
+use crate::log::{Log, Stretch};
 use crate::orbit::{Place, solution};
 use foldline::special::quantity::Quantity;
 use foldline_store::diagnostic::Diagnostic;
-use foldline_store::run_file::{Part, Reading, RunFileError, Span, is_written, path_in};
+use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
 use foldline_store::study_file::{Study, parse_study_of_run};
 use serde_json::{Value, json};
-use std::collections::HashMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Largest number of points in one answer.
-pub(crate) const ROWS: u64 = 20_000;
 /// Time after which the file is read even if it looks unchanged: file systems record times in coarse steps.
 const AT_LEAST: Duration = Duration::from_secs(1);
 
@@ -71,32 +67,14 @@ struct Shared {
 struct Growing {
     study: Arc<Study>,
     quantities: Arc<[Quantity]>,
-    epoch: u64,
     /// Number of changes seen.
     version: u64,
-    log: Vec<Stretch>,
-    /// Range of positions of each branch that is in `log`.
-    reach: HashMap<i64, [i64; 2]>,
+    log: Log,
     state: Arc<str>,
     written: bool,
     code: Option<i32>,
     stamp: Option<Stamp>,
     seen: Instant,
-}
-
-/// Consecutive positions of a branch.
-#[derive(Clone, Copy, Debug)]
-struct Stretch {
-    /// Cursor of the first point.
-    first: u64,
-    branch: i64,
-    reach: [i64; 2],
-}
-
-impl Stretch {
-    fn points(&self) -> u64 {
-        (self.reach[1] - self.reach[0] + 1).max(0) as u64
-    }
 }
 
 /// Time and size of the file and of its log.
@@ -126,10 +104,8 @@ impl Watch {
         let growing = Growing {
             study,
             quantities,
-            epoch: 1,
             version: 0,
-            log: Vec::new(),
-            reach: HashMap::new(),
+            log: Log::default(),
             state: "{}".into(),
             written: false,
             code: None,
@@ -170,13 +146,13 @@ impl Watch {
         growing.stamp = Some(stamp);
         growing.seen = Instant::now();
         let before = growing.notice();
-        growing.grow(&spans);
+        growing.log.grow(&spans);
         (growing.written, growing.code) = (written, code);
         let study = Arc::clone(&growing.study);
         let mut state = state(run, &spans, &study, &growing.quantities);
         state["running"] = written.into();
         state["code"] = code.into();
-        state["points"] = growing.points().into();
+        state["points"] = growing.log.points().into();
         let text = state.to_string();
         let changed = *text != *growing.state || before != growing.notice();
         if changed {
@@ -190,7 +166,7 @@ impl Watch {
         self.growing().notice()
     }
 
-    /// What does not change while the run grows: model, study, quantities.
+    /// Model, study and quantities, which do not change while the run grows.
     pub(crate) fn description(&self) -> Value {
         let (study, quantities) = self.about();
         described(&study, &quantities, &self.0.folder)
@@ -199,7 +175,7 @@ impl Watch {
     /// Branches, special points, ends and notes.
     pub(crate) fn state(&self) -> String {
         let growing = self.growing();
-        format!("{{\"epoch\":{},\"version\":{},\"state\":{}}}", growing.epoch, growing.version, growing.state)
+        format!("{{\"epoch\":{},\"version\":{},\"state\":{}}}", growing.log.epoch(), growing.version, growing.state)
     }
 
     fn about(&self) -> (Arc<Study>, Arc<[Quantity]>) {
@@ -220,7 +196,7 @@ impl Watch {
         let (study, all) = self.about();
         let (wanted, now, last) = {
             let growing = self.growing();
-            (growing.since(since), growing.epoch, growing.points())
+            (growing.log.since(since), growing.log.epoch(), growing.log.points())
         };
         if now != epoch {
             return Ok(frame(&json!({ "restart": true, "epoch": now }), &[]));
@@ -268,51 +244,9 @@ impl Watch {
 }
 
 impl Growing {
-    fn points(&self) -> u64 {
-        self.log.last().map_or(0, |stretch| stretch.first + stretch.points())
-    }
-
     fn notice(&self) -> Notice {
-        Notice { epoch: self.epoch, version: self.version, points: self.points(), running: self.written }
-    }
-
-    /// Appends what is new. If points have disappeared, begins a new epoch.
-    fn grow(&mut self, spans: &[Span]) {
-        let kept = |(branch, [low, high]): (&i64, &[i64; 2])| {
-            let reach = spans.iter().find(|span| span.number == *branch).and_then(|span| span.reach);
-            reach.is_some_and(|[first, last]| first <= *low && last >= *high)
-        };
-        if !self.reach.iter().all(kept) {
-            self.epoch += 1;
-            self.log.clear();
-            self.reach.clear();
-        }
-        for (branch, [first, last]) in spans.iter().filter_map(|span| Some((span.number, span.reach?))) {
-            let parts = match self.reach.insert(branch, [first, last]) {
-                None => vec![[first, last]],
-                Some([low, high]) => vec![[first, low - 1], [high + 1, last]],
-            };
-            for reach in parts.into_iter().filter(|[from, to]| from <= to) {
-                self.log.push(Stretch { first: self.points(), branch, reach });
-            }
-        }
-    }
-
-    /// Stretches from a cursor on, at most [`ROWS`] points in all.
-    fn since(&self, cursor: u64) -> Vec<Stretch> {
-        let (mut found, mut left) = (Vec::new(), ROWS);
-        let from = self.log.partition_point(|stretch| stretch.first + stretch.points() <= cursor);
-        for stretch in &self.log[from..] {
-            let skipped = cursor.saturating_sub(stretch.first) as i64;
-            let low = stretch.reach[0] + skipped;
-            let high = stretch.reach[1].min(low + left as i64 - 1);
-            if left == 0 {
-                break;
-            }
-            left -= (high - low + 1) as u64;
-            found.push(Stretch { reach: [low, high], ..*stretch });
-        }
-        found
+        let Growing { version, log, written, .. } = self;
+        Notice { epoch: log.epoch(), version: *version, points: log.points(), running: *written }
     }
 }
 
@@ -322,72 +256,4 @@ fn stamp(folder: &Path) -> Stamp {
     log.push("-wal");
     [path, log.into()]
         .map(|path| std::fs::metadata(path).ok().and_then(|data| Some((data.modified().ok()?, data.len()))))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn growing() -> Growing {
-        let text = "model = \"m.toml\"\n";
-        let model = "name = \"m\"\n[states.x]\nequation = \"-x\"\n";
-        let study = parse_study_of_run(text, "s.toml", model, "m.toml").expect("the study is right");
-        Growing {
-            study: Arc::new(study),
-            quantities: Vec::new().into(),
-            epoch: 1,
-            version: 0,
-            log: Vec::new(),
-            reach: HashMap::new(),
-            state: "".into(),
-            written: true,
-            code: None,
-            stamp: None,
-            seen: Instant::now(),
-        }
-    }
-
-    fn span(number: i64, reach: [i64; 2]) -> Span {
-        Span { number, name: number.to_string(), reach: Some(reach) }
-    }
-
-    fn positions(stretches: &[Stretch]) -> Vec<(i64, i64)> {
-        stretches.iter().flat_map(|own| (own.reach[0]..=own.reach[1]).map(|position| (own.branch, position))).collect()
-    }
-
-    #[test]
-    fn branches_that_grow_at_both_ends_are_passed_on_once() {
-        let mut growing = growing();
-        growing.grow(&[span(1, [0, 2])]);
-        assert_eq!(positions(&growing.since(0)), [(1, 0), (1, 1), (1, 2)]);
-        growing.grow(&[span(1, [-1, 3]), span(2, [0, 0])]);
-        assert_eq!(positions(&growing.since(3)), [(1, -1), (1, 3), (2, 0)]);
-        assert_eq!(positions(&growing.since(4)), [(1, 3), (2, 0)]);
-        assert_eq!(growing.since(6).len(), 0);
-        assert_eq!((growing.epoch, growing.points()), (1, 6));
-        growing.grow(&[span(1, [-1, 3]), span(2, [0, 0])]);
-        assert_eq!((growing.epoch, growing.points()), (1, 6));
-    }
-
-    #[test]
-    fn removed_points_begin_an_epoch() {
-        let mut growing = growing();
-        growing.grow(&[span(1, [0, 9]), span(2, [0, 4])]);
-        growing.grow(&[span(1, [0, 9]), span(2, [0, 3])]);
-        assert_eq!((growing.epoch, growing.points()), (2, 14));
-        growing.grow(&[span(1, [0, 9])]);
-        assert_eq!((growing.epoch, growing.points()), (3, 10));
-    }
-
-    #[test]
-    fn an_answer_has_a_bounded_number_of_points() {
-        let mut growing = growing();
-        let long = ROWS as i64 + 10;
-        growing.grow(&[span(1, [0, 5]), span(2, [0, long])]);
-        let first = positions(&growing.since(0));
-        assert_eq!(first.len() as u64, ROWS);
-        let rest = positions(&growing.since(ROWS));
-        assert_eq!(first.len() as u64 + rest.len() as u64, growing.points());
-        assert_eq!(rest[0], (2, ROWS as i64 - 6));
-    }
 }

@@ -1,4 +1,4 @@
-//! A run is shown while it grows, and its file is left as if nobody had looked.
+//! A run is shown while it grows, and its file is left unchanged.
 
 mod common;
 

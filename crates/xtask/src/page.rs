@@ -43,7 +43,8 @@ pub fn test() -> bool {
 /// Program of Chromium itself: a wrapper of a distribution may add options for a graphics processor.
 fn browser() -> Option<PathBuf> {
     let own = std::env::var_os("CHROMIUM").map(PathBuf::from);
-    let known = ["/usr/lib/chromium/chromium", "/usr/lib64/chromium-browser/chromium-browser", "/opt/google/chrome/chrome"];
+    let known =
+        ["/usr/lib/chromium/chromium", "/usr/lib64/chromium-browser/chromium-browser", "/opt/google/chrome/chrome"];
     own.into_iter().chain(known.map(PathBuf::from)).find(|path| path.is_file())
 }
 
