@@ -52,11 +52,15 @@ impl Served {
         Served { port, token, stop, thread: Some(thread) }
     }
 
-    /// Sends bytes, ends the sending side and returns everything that comes back.
-    pub fn raw(&self, bytes: &[u8]) -> Vec<u8> {
+    /// Sends bytes and returns everything that comes back. With `last`, also says that nothing follows; the server
+    /// takes that as the end of the connection and may drop an answer in progress.
+    pub fn raw(&self, bytes: &[u8], last: bool) -> Vec<u8> {
         let mut stream = self.connect();
         // The server may close before everything is sent.
-        let _ = stream.write_all(bytes).and_then(|()| stream.shutdown(Shutdown::Write));
+        let sent = stream.write_all(bytes);
+        if last && sent.is_ok() {
+            let _ = stream.shutdown(Shutdown::Write);
+        }
         let mut answer = Vec::new();
         match stream.read_to_end(&mut answer) {
             Err(error) if matches!(error.kind(), std::io::ErrorKind::WouldBlock | std::io::ErrorKind::TimedOut) => {
@@ -75,7 +79,7 @@ impl Served {
     /// Sends a request with the given lines after the first and returns status, head and body.
     pub fn ask(&self, first: &str, lines: &[&str]) -> (u16, String, Vec<u8>) {
         let lines: String = lines.iter().map(|line| format!("{line}\r\n")).collect();
-        split(&self.raw(format!("{first}\r\n{lines}Connection: close\r\n\r\n").as_bytes()))
+        split(&self.raw(format!("{first}\r\n{lines}Connection: close\r\n\r\n").as_bytes(), false))
     }
 
     pub fn host(&self) -> String {
