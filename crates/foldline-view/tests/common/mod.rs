@@ -2,7 +2,7 @@
 
 use foldline::diagram::Diagram;
 use foldline::explore;
-use foldline_store::run_file::Recorder;
+use foldline_store::run_file::{Recorder, load};
 use foldline_store::study_file::{Study, parse_study};
 use foldline_view::{Server, Stop, Watch};
 use std::io::{Read, Write};
@@ -23,14 +23,14 @@ pub fn study() -> Study {
     parse_study(STUDY, "study.toml", MODEL, "pitchfork.toml").expect("the study is right")
 }
 
-/// Computes a small run.
+/// Computes a small run and returns it as it is stored: with all points, of which only some stay in memory.
 pub fn run_in(folder: &Path) -> Diagram {
     let study = study();
     let recorder = Recorder::create(folder, &study).expect("the folder is new");
     let system = explore::System::of_plan(&study.model, &study.plan);
-    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &recorder);
+    explore::run(&system, &study.plan, 1, Diagram::default(), &recorder);
     recorder.complete().expect("the run can be written");
-    diagram
+    load(folder).expect("the run can be read").diagram
 }
 
 /// A server in a thread of its own; it ends when this is dropped.
