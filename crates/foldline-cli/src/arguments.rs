@@ -54,9 +54,11 @@ pub enum Command {
     /// Recompute the solutions of a run by an independent method and compare
     #[command(after_help = VERIFY_CODES)]
     Verify(Verify),
+    /// Show a run in the browser, also while it is computed
+    View(View),
     /// Draw the bifurcation diagram of a run
     Plot(Plot),
-    /// Export a run as CSV, Parquet or NetCDF
+    /// Export a run as CSV, Parquet or NetCDF, or as a page for a browser
     Export(Export),
     /// List the solutions in AUTO-07p files, or write a study that starts from them
     ImportAuto(ImportAuto),
@@ -440,6 +442,22 @@ pub struct Verify {
 }
 
 #[derive(Debug, Args)]
+pub struct View {
+    /// Folder of a run, or a study, whose run is started or resumed
+    #[arg(value_name = "DIR|STUDY.toml")]
+    pub what: PathBuf,
+    /// Folder for the run of a study [default: runs/NAME for NAME.toml]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Number of branches that the run of a study follows in parallel [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Print the address without opening a browser
+    #[arg(long)]
+    pub no_browser: bool,
+}
+
+#[derive(Debug, Args)]
 pub struct Plot {
     /// Folder of the run
     #[arg(value_name = "DIR")]
@@ -477,7 +495,7 @@ pub struct Export {
     /// Format
     #[arg(long, value_enum)]
     pub format: ExportFormat,
-    /// Folder for the tables, or NetCDF file [default: DIR/csv, DIR/parquet, DIR/run.nc]
+    /// Folder for the tables, or NetCDF or HTML file [default: DIR/csv, DIR/parquet, DIR/run.nc, DIR/run.html]
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Only this branch, or the legs of this homotopy; can be repeated [default: everything]
@@ -500,6 +518,8 @@ pub enum ExportFormat {
     Parquet,
     /// One NetCDF-4 file with a group per branch
     Netcdf,
+    /// One page with diagram and orbits for any browser, without a server
+    Html,
 }
 
 #[derive(Debug, Args)]

@@ -5,9 +5,16 @@ use crate::failure::{Failure, Outcome};
 use crate::table::{asked_for, conversion};
 use crate::verbosity::report;
 use foldline_store::export::{Export, ExportError, Format};
+use foldline_view::Amount;
 
 /// Writes a run in another format and reports the path.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
+    let (format, name) = match typed.format {
+        ExportFormat::Csv => (Format::Csv, "csv"),
+        ExportFormat::Parquet => (Format::Parquet, "parquet"),
+        ExportFormat::Netcdf => (Format::NetCdf, "run.nc"),
+        ExportFormat::Html => return page(typed),
+    };
     let mut export = Export::open(&typed.folder)?;
     export.profiles = !typed.no_profiles;
     if !typed.branch.is_empty() {
@@ -18,11 +25,6 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(conversion) = conversion(export.model(), &typed.unit)? {
         export.show_in(conversion);
     }
-    let (format, name) = match typed.format {
-        ExportFormat::Csv => (Format::Csv, "csv"),
-        ExportFormat::Parquet => (Format::Parquet, "parquet"),
-        ExportFormat::Netcdf => (Format::NetCdf, "run.nc"),
-    };
     let out = typed.out.clone().unwrap_or_else(|| typed.folder.join(name));
     if format == Format::NetCdf && out.is_dir() {
         let cure = format!("name a file, such as --out {}", out.join("run.nc").display());
@@ -35,6 +37,29 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     for file in export.write(format, &out)? {
         report(format_args!("wrote {}", file.display()))?;
     }
+    Ok(Outcome::Done)
+}
+
+/// Writes a run as a page that needs no server.
+fn page(typed: &Typed) -> Result<Outcome, Failure> {
+    if !typed.branch.is_empty() || !typed.unit.is_empty() || typed.no_profiles {
+        let message = "--format html: --branch, --unit and --no-profiles do not apply to a page";
+        return Err(Failure::typed(message, "leave them out; the page shows and hides branches itself"));
+    }
+    let out = typed.out.clone().unwrap_or_else(|| typed.folder.join("run.html"));
+    if out.is_dir() {
+        let cure = format!("name a file, such as --out {}", out.join("run.html").display());
+        return Err(Failure::typed(format!("--out {}: this is a folder", out.display()), cure));
+    }
+    let (text, amount) = foldline_view::html(&typed.folder)?;
+    let failed = |error| Failure::from(foldline_view::Failure::Output(out.clone(), error));
+    if let Some(folder) = out.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
+    let meanwhile = out.with_extension("html.tmp");
+    std::fs::write(&meanwhile, text).and_then(|()| std::fs::rename(&meanwhile, &out)).map_err(failed)?;
+    let Amount { points, solutions } = amount;
+    report(format_args!("wrote {} with {points} points; {solutions} solutions include their orbits", out.display()))?;
     Ok(Outcome::Done)
 }
 

@@ -18,6 +18,7 @@ mod table;
 mod values;
 mod verbosity;
 mod verify;
+mod view;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -46,6 +47,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Simulate(typed)) => simulate::trajectory(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
+        Some(Command::View(typed)) => view::show(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Export(typed)) => export::write(&typed),
         Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),

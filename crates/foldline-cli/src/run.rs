@@ -26,10 +26,7 @@ const REFERENCE: &str = "studies/overhung-rotor/bouncing.toml";
 /// Runs a study file.
 pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
     let study = limited(read_study(&typed.study)?, &typed.limits)?;
-    let folder = typed.out.clone().unwrap_or_else(|| {
-        let stem = typed.study.file_stem().unwrap_or("study".as_ref());
-        PathBuf::from("runs").join(stem)
-    });
+    let folder = folder_of(&typed.study, typed.out.as_deref());
     let way = Way {
         jobs: typed.jobs.map_or_else(processors, usize::from),
         resume: typed.resume,
@@ -38,6 +35,14 @@ pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
         folder: &folder,
     };
     carried_out(&study, &way)
+}
+
+/// Folder of the run of a study: `runs/NAME` unless another one was given.
+pub fn folder_of(study: &Path, given: Option<&Path>) -> PathBuf {
+    given.map(Path::to_path_buf).unwrap_or_else(|| {
+        let stem = study.file_stem().unwrap_or("study".as_ref());
+        PathBuf::from("runs").join(stem)
+    })
 }
 
 /// The study with the limits given on the command line.

@@ -5,6 +5,7 @@ mod gallery;
 mod invariants;
 mod kill;
 mod links;
+mod page;
 mod phrases;
 mod python;
 mod readers;
@@ -22,6 +23,7 @@ const USAGE: &str = "cargo xtask TASK
   check       the same without the tests and the dependencies
   words       spelling, links, phrasing and the invariants of ARCHITECTURE.md; with --all phrases in files that are not revised yet too
   address     replaces the address of the repository everywhere: cargo xtask address https://HOST/PATH
+  page        the page of `foldline view` in Chromium; where Node.js or Chromium is missing that is said
   python      the wheel of the Python package, its formatter, type checker and tests in an environment under target; where there is no
               Python that is said
   deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
@@ -47,12 +49,14 @@ fn main() -> ExitCode {
             check()
                 && readers::prepared()
                 && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"])
+                && page::test()
                 && python::test()
                 && deny()
         }
         "check" => check(),
         "words" => words(std::env::args().nth(2).as_deref() == Some("--all")),
         "address" => release::move_to(&std::env::args().nth(2).unwrap_or_default()),
+        "page" => page::test(),
         "python" => python::test(),
         "deny" => deny(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),

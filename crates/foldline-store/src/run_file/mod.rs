@@ -18,11 +18,13 @@ mod responses;
 mod rows;
 mod schema;
 mod stream;
+mod view;
 mod writer;
 
 pub use reader::{Part, Reading, Recorded, load, load_part};
 pub(crate) use schema::{Columns, free_name};
 pub use stream::Extent;
+pub use view::{Span, is_written};
 pub use writer::Recorder;
 
 use std::fmt;

@@ -225,8 +225,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
             }
         }
         // In the order of a branch: on the backward side, the special point found first comes last.
-        let sql =
-            of_branch(&of_special, "special_points", "position, CASE WHEN position < 0 THEN -rowid ELSE rowid END");
+        let sql = of_branch(&of_special, "special_points", special_order());
         branch.special = read(connection, path, &sql, &[number], special_in)?;
         let ends = read(connection, path, &of_branch("*", "ends", "side"), &[number], |row| {
             let side: i64 = row.get("side").map_err(|e| e.to_string())?;
@@ -242,6 +241,11 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
     diagram.responses = super::responses::load(connection, path)?;
     diagram.shortfalls = shortfalls(connection, path)?;
     Ok(diagram)
+}
+
+/// Order of the special points of a branch.
+pub(super) fn special_order() -> &'static str {
+    "position, CASE WHEN position < 0 THEN -rowid ELSE rowid END"
 }
 
 /// Loads the requests that were not fulfilled; files of earlier versions have none.

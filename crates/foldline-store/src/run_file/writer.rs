@@ -70,11 +70,15 @@ const PAGE: i64 = 8192;
 /// Size of the log in bytes at which it is checkpointed; it still fits into the processor's cache.
 const LOG: i64 = 4 << 20;
 
+/// Number of attempts, and the pause between them, to get hold of a file that a viewer may be reading.
+const TRIES: usize = 20;
+const PAUSE: std::time::Duration = std::time::Duration::from_millis(10);
+
 /// Number of events between two checks that the file is still in place.
 const LOOKS: usize = 16;
 
 /// Key in `meta` that records the removal of profiles.
-const THINNED: &str = "profiles removed";
+pub(super) const THINNED: &str = "profiles removed";
 
 /// Creates and empties the table of requests that were not fulfilled. A resumed run recomputes them.
 const SHORTFALLS: &str =
@@ -101,11 +105,26 @@ fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
     let path = folder.join("run.lock");
     let open = File::options().create(true).write(true).truncate(false).open(&path);
     let file = open.map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
-    match file.try_lock() {
-        Ok(()) => Ok(Some(file)),
-        Err(TryLockError::WouldBlock) => Err(RunFileError::Busy(path_in(folder))),
-        // Some file systems do not support locks.
-        Err(TryLockError::Error(_)) => Ok(None),
+    // A viewer that asks if a run is being written holds the lock for an instant (`is_written`).
+    for _ in 0..TRIES {
+        match file.try_lock() {
+            Ok(()) => return Ok(Some(file)),
+            Err(TryLockError::WouldBlock) => std::thread::sleep(PAUSE),
+            // Some file systems do not support locks.
+            Err(TryLockError::Error(_)) => return Ok(None),
+        }
+    }
+    Err(RunFileError::Busy(path_in(folder)))
+}
+
+/// Folds the log into the file and removes it, unless another program stays connected. A viewer connects for a few
+/// milliseconds at a time.
+fn remove_log(connection: &Connection) {
+    for _ in 0..TRIES {
+        match connection.pragma_update(None, "journal_mode", "DELETE") {
+            Ok(()) => return,
+            Err(_) => std::thread::sleep(PAUSE),
+        }
     }
 }
 
@@ -289,7 +308,7 @@ impl Recorder {
         }
         thin(&state.connection, store).map_err(|error| RunFileError::from_sqlite(&self.path, error))?;
         // Leaves a single file without a log, unless another program is reading it.
-        let _ = state.connection.pragma_update(None, "journal_mode", "DELETE");
+        remove_log(&state.connection);
         state.connection.close().map_err(|(_, error)| RunFileError::from_sqlite(&self.path, error))?;
         if let Some(folder) = self.path.parent() {
             let _ = std::fs::remove_file(folder.join("run.lock"));

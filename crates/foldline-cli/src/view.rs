@@ -1,0 +1,148 @@
+//! `foldline view`: a run in the browser, while it is computed and afterwards.
+
+use crate::arguments::View as Typed;
+use crate::failure::{Failure, Outcome};
+use crate::run::folder_of;
+use crate::verbosity::report;
+use foldline_store::run_file::{Part, Reading, is_written, path_in};
+use foldline_store::study_file::{Study, is_study, read_study};
+use foldline_view::{Server, Watch, open_browser};
+use std::io::{Write, stderr, stdout};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread::{sleep, spawn};
+use std::time::Duration;
+
+/// Interval between two attempts to open a run file that is being created.
+const PAUSE: Duration = Duration::from_millis(20);
+/// Time that a run has to stop after Ctrl-C, which its process receives too.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Shows a run, or starts the run of a study and shows it.
+pub fn show(typed: &Typed) -> Result<Outcome, Failure> {
+    let what = &typed.what;
+    if what.is_dir() || what.file_name().is_some_and(|name| name == "run.sqlite") {
+        let folder = if what.is_dir() { what.clone() } else { folder_above(what) };
+        return served(Watch::open(&folder)?, None, &folder, typed);
+    }
+    // If the file cannot be read, the study reader reports why.
+    let text = std::fs::read_to_string(what).unwrap_or_default();
+    if !text.is_empty() && !is_study(&text) {
+        let message = format!("{}: this is not a study", what.display());
+        let cure = format!("`foldline new --study {}` writes a study for a model", what.display());
+        return Err(Failure::typed(message, cure));
+    }
+    let study = read_study(what)?;
+    let folder = folder_of(what, typed.out.as_deref());
+    let Some(mut child) = started(&study, &folder, typed)? else {
+        return served(Watch::open(&folder)?, None, &folder, typed);
+    };
+    let watch = opened(&folder, &mut child)?;
+    served(watch, Some(child), &folder, typed)
+}
+
+fn folder_above(file: &Path) -> PathBuf {
+    file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_path_buf()
+}
+
+/// Starts or resumes the run of a study in a process of its own, which outlives this one if necessary. `None` if another
+/// process is computing it, or it is complete and cannot be resumed.
+fn started(study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>, Failure> {
+    let exists = path_in(folder).exists();
+    if exists {
+        if is_written(folder) {
+            report(format_args!("another process is computing this run"))?;
+            return Ok(None);
+        }
+        let reading = Reading::open(folder)?;
+        let stored = reading.recorded(Part::Special)?;
+        if stored.study_text != study.text || stored.model_text != study.model_text {
+            let message = format!("the study or its model has changed since the run in {} began", folder.display());
+            let cure = format!(
+                "start a new run with --out DIR, or show the old one with `foldline view {}`",
+                folder.display()
+            );
+            return Err(Failure::typed(message, cure));
+        }
+        if reading.is_thinned()? {
+            return Ok(None);
+        }
+    }
+    let mut command = Command::new(std::env::current_exe()?);
+    command.arg("run").arg(&typed.what).arg("--out").arg(folder);
+    command.args(exists.then_some("--resume"));
+    command.args(typed.jobs.map(|jobs| format!("--jobs={jobs}")));
+    let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn();
+    child.map(Some).map_err(|error| Failure::Outside(format!("the run cannot be started: {error}")))
+}
+
+/// Opens the file of a run that is starting.
+fn opened(folder: &Path, child: &mut Child) -> Result<Watch, Failure> {
+    loop {
+        let over = child.try_wait()?;
+        match Watch::open(folder) {
+            Ok(watch) => return Ok(watch),
+            // The process has said why.
+            Err(_) if over.is_some_and(|status| status.code() == Some(2)) => {
+                return Err(Failure::Typed("the run did not start".into()));
+            }
+            Err(error) if over.is_some() => return Err(error.into()),
+            Err(_) => sleep(PAUSE),
+        }
+    }
+}
+
+/// Serves until Ctrl-C.
+fn served(watch: Watch, child: Option<Child>, folder: &Path, typed: &Typed) -> Result<Outcome, Failure> {
+    let server =
+        Server::new(watch.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
+    let address = server.address();
+    writeln!(stdout(), "{address}")?;
+    stdout().flush()?;
+    report(format_args!("showing {}; the address works once; Ctrl-C ends the server", folder.display()))?;
+    if !typed.no_browser && !open_browser(&address) {
+        report(format_args!("no browser can be opened here; open the address in one on this computer"))?;
+    }
+    let process = child.as_ref().map(Child::id);
+    let over = child.map(|child| ending(child, watch));
+    let (stop, again) = (server.stopper(), AtomicBool::new(false));
+    let handler = move || {
+        if again.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        stop.stop();
+    };
+    // Without a handler Ctrl-C ends the program at once, which harms nothing.
+    let _ = ctrlc::set_handler(handler);
+    server.run().map_err(|error| Failure::Outside(format!("the server has failed: {error}")))?;
+    if let (Some(over), Some(process)) = (over, process)
+        && over.recv_timeout(PATIENCE).is_err()
+    {
+        let folder = folder.display();
+        writeln!(stderr(), "the run continues in process {process}; `foldline view {folder}` shows it again")?;
+    }
+    Ok(Outcome::Done)
+}
+
+/// Tells `watch` when the process has ended, and by what code. The receiver hears of it too.
+fn ending(mut child: Child, watch: Watch) -> Receiver<()> {
+    let (sender, receiver) = channel();
+    spawn(move || {
+        let code = child.wait().ok().and_then(|status| status.code()).unwrap_or(1);
+        watch.ended(code);
+        let _ = sender.send(());
+    });
+    receiver
+}
+
+impl From<foldline_view::Failure> for Failure {
+    fn from(error: foldline_view::Failure) -> Failure {
+        match error {
+            foldline_view::Failure::Run(error) => error.into(),
+            foldline_view::Failure::Study(found) => found.into(),
+            foldline_view::Failure::Output(..) => Failure::Outside(error.to_string()),
+        }
+    }
+}

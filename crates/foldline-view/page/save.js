@@ -1,0 +1,42 @@
+// The view as a file: SVG, PNG, CSV.
+
+import { download } from "./dom.js";
+import { exact } from "./numbers.js";
+
+const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+
+/** File name without ending, from study and axes. */
+export function fileName(run, diagram) {
+  const about = run.about.quantities;
+  const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
+  return [study, about[diagram.qx].name, about[diagram.qy].name].join("-").replace(/[^\w.-]+/g, "_");
+}
+
+export function saveSvg(run, diagram) {
+  download(`${fileName(run, diagram)}.svg`, diagram.chart.svg(run.about.model.name), "image/svg+xml");
+}
+
+export async function savePng(run, diagram) {
+  const image = await diagram.chart.png();
+  if (image) download(`${fileName(run, diagram)}.png`, image, "image/png");
+}
+
+/** The branches that are shown, with the columns that are loaded, as comma-separated values with all digits. */
+export function csvText(run, diagram) {
+  const about = run.about.quantities;
+  const columns = [...run.loaded].sort((a, b) => a - b);
+  const lines = [["branch", "position", "kind", "unstable_before", "unstable_after", ...columns.map((k) => about[k].name)].map(quoted).join(",")];
+  for (const branch of diagram.shownBranches()) {
+    for (const place of branch.places()) {
+      const special = branch.special[place.special];
+      const unstable = special ? [special.before, special.after] : [branch.unstable(place), branch.unstable(place)];
+      const cells = [branch.about.name, place.position, special?.kind ?? "", ...unstable, ...columns.map((k) => exact(branch.value(place, k)))];
+      lines.push(cells.map((cell) => quoted(String(cell))).join(","));
+    }
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+export function saveCsv(run, diagram) {
+  download(`${fileName(run, diagram)}.csv`, csvText(run, diagram), "text/csv");
+}

@@ -1,0 +1,31 @@
+//! The explorer: a local server with one page that shows a run in a browser, and the same page as a file.
+//!
+//! **Idea.** A run is watched through its file ([`foldline_store::run_file`]), whether it is complete or still being
+//! computed by another process. [`serve`] answers one browser on this computer: `gate` refuses everything that does
+//! not come from the page itself, `routes` maps a closed list of paths to `watch`, which reads the file. [`html`]
+//! puts the page and the data into one file that needs no server.
+//!
+//! The page is in `page/`: plain JavaScript modules, joined into one script by `page`.
+//!
+//! **Departures.** No web framework: seven paths need no router
+//! (docs/decisions/0037-explorer.md).
+
+mod body;
+mod browser;
+mod describe;
+mod frame;
+mod gate;
+mod html;
+mod log;
+mod orbit;
+mod page;
+mod query;
+mod routes;
+mod server;
+mod watch;
+
+pub use browser::open as open_browser;
+pub use html::{Amount, html};
+pub use page::script;
+pub use server::{Server, Stop};
+pub use watch::{Failure, Watch};

@@ -1,0 +1,259 @@
+//! A run that is watched through its file.
+//!
+//! **Idea.** The file says which positions each branch has; `log` numbers them in the order in which they were first
+//! seen. The numbers of the points stay in the file, which is opened for each look and closed at once (`foldline_store::run_file`).
+
+use crate::describe::{described, state};
+use crate::frame::frame;
+use crate::log::{Log, Stretch};
+use crate::orbit::{Place, solution};
+use foldline::special::quantity::Quantity;
+use foldline_store::diagnostic::Diagnostic;
+use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
+use foldline_store::study_file::{Study, parse_study_of_run};
+use serde_json::{Value, json};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant, SystemTime};
+
+/// Time after which the file is read even if it looks unchanged: file systems record times in coarse steps.
+const AT_LEAST: Duration = Duration::from_secs(1);
+
+/// Reason why a run cannot be shown.
+#[derive(Debug)]
+pub enum Failure {
+    /// The run file cannot be read.
+    Run(RunFileError),
+    /// The study or the model stored in the run is invalid.
+    Study(Vec<Diagnostic>),
+    /// The file to be written, and the reason why it cannot be.
+    Output(PathBuf, std::io::Error),
+}
+
+impl From<RunFileError> for Failure {
+    fn from(error: RunFileError) -> Failure {
+        Failure::Run(error)
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Failure::Run(error) => write!(f, "{error}"),
+            Failure::Study(found) => found.iter().try_for_each(|diagnostic| writeln!(f, "{diagnostic}")),
+            Failure::Output(path, error) => write!(
+                f,
+                "{} cannot be written: {error}\n  help: free some space there, or write elsewhere with `--out PATH`",
+                path.display()
+            ),
+        }
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Run in a folder, complete or growing.
+#[derive(Clone)]
+pub struct Watch(Arc<Shared>);
+
+struct Shared {
+    folder: PathBuf,
+    growing: Mutex<Growing>,
+    /// Exit code of the process that computes the run, if this program has started it and it has ended.
+    code: Mutex<Option<i32>>,
+}
+
+struct Growing {
+    study: Arc<Study>,
+    quantities: Arc<[Quantity]>,
+    /// Number of changes seen.
+    version: u64,
+    log: Log,
+    state: Arc<str>,
+    written: bool,
+    code: Option<i32>,
+    stamp: Option<Stamp>,
+    seen: Instant,
+}
+
+/// Time and size of the file and of its log.
+type Stamp = [Option<(SystemTime, u64)>; 2];
+
+/// News about the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Notice {
+    pub(crate) epoch: u64,
+    pub(crate) version: u64,
+    pub(crate) points: u64,
+    pub(crate) running: bool,
+}
+
+impl Watch {
+    /// Opens the run in a folder.
+    ///
+    /// # Errors
+    /// If there is no run, or its file, study or model cannot be read.
+    pub fn open(folder: &Path) -> Result<Watch, Failure> {
+        let reading = Reading::open(folder)?;
+        let run = reading.recorded(Part::Special)?;
+        let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
+        let study = Arc::new(study.map_err(Failure::Study)?);
+        let names = Quantity::names(&study.model);
+        let quantities = names.iter().filter_map(|name| Quantity::named(name, &study.model)).collect();
+        let growing = Growing {
+            study,
+            quantities,
+            version: 0,
+            log: Log::default(),
+            state: "{}".into(),
+            written: false,
+            code: None,
+            stamp: None,
+            seen: Instant::now(),
+        };
+        let shared = Shared { folder: folder.to_path_buf(), growing: Mutex::new(growing), code: Mutex::new(None) };
+        let watch = Watch(Arc::new(shared));
+        watch.look()?;
+        Ok(watch)
+    }
+
+    /// Notes that the process that computes the run has ended.
+    pub fn ended(&self, code: i32) {
+        *self.0.code.lock().unwrap_or_else(PoisonError::into_inner) = Some(code);
+    }
+
+    /// Looks for changes. Returns true if something has changed.
+    ///
+    /// # Errors
+    /// If the file cannot be read. What was read before stays available.
+    pub(crate) fn look(&self) -> Result<bool, RunFileError> {
+        let written = is_written(&self.0.folder);
+        let code = *self.0.code.lock().unwrap_or_else(PoisonError::into_inner);
+        let stamp = stamp(&self.0.folder);
+        {
+            let growing = self.growing();
+            let same = growing.stamp == Some(stamp) && growing.written == written && growing.code == code;
+            if same && (!written || growing.seen.elapsed() < AT_LEAST) {
+                return Ok(false);
+            }
+        }
+        let reading = Reading::open(&self.0.folder)?;
+        let spans = reading.spans()?;
+        let run = reading.recorded(Part::Special)?;
+        drop(reading);
+        let mut growing = self.growing();
+        growing.stamp = Some(stamp);
+        growing.seen = Instant::now();
+        let before = growing.notice();
+        growing.log.grow(&spans);
+        (growing.written, growing.code) = (written, code);
+        let study = Arc::clone(&growing.study);
+        let mut state = state(run, &spans, &study, &growing.quantities);
+        state["running"] = written.into();
+        state["code"] = code.into();
+        state["points"] = growing.log.points().into();
+        let text = state.to_string();
+        let changed = *text != *growing.state || before != growing.notice();
+        if changed {
+            growing.state = text.into();
+            growing.version += 1;
+        }
+        Ok(changed)
+    }
+
+    pub(crate) fn notice(&self) -> Notice {
+        self.growing().notice()
+    }
+
+    /// Model, study and quantities, which do not change while the run grows.
+    pub(crate) fn description(&self) -> Value {
+        let (study, quantities) = self.about();
+        described(&study, &quantities, &self.0.folder)
+    }
+
+    /// Branches, special points, ends and notes.
+    pub(crate) fn state(&self) -> String {
+        let growing = self.growing();
+        format!("{{\"epoch\":{},\"version\":{},\"state\":{}}}", growing.log.epoch(), growing.version, growing.state)
+    }
+
+    fn about(&self) -> (Arc<Study>, Arc<[Quantity]>) {
+        let growing = self.growing();
+        (Arc::clone(&growing.study), Arc::clone(&growing.quantities))
+    }
+
+    pub(crate) fn quantities(&self) -> usize {
+        self.growing().quantities.len()
+    }
+
+    /// Returns a frame of the points from a cursor on: branch, position, number of unstable eigenvalues or multipliers,
+    /// and the columns asked for. If the epoch is over, the header says so and there are no points.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn points(&self, epoch: u64, since: u64, columns: &[usize]) -> Result<Vec<u8>, RunFileError> {
+        let (study, all) = self.about();
+        let (wanted, now, last) = {
+            let growing = self.growing();
+            (growing.log.since(since), growing.log.epoch(), growing.log.points())
+        };
+        if now != epoch {
+            return Ok(frame(&json!({ "restart": true, "epoch": now }), &[]));
+        }
+        let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k).copied()).collect();
+        let mut found = vec![Vec::new(); 3 + quantities.len()];
+        let reading = Reading::open(&self.0.folder)?;
+        for Stretch { branch, reach, .. } in &wanted {
+            let before = found[0].len() as u64;
+            reading.each_value(*branch, *reach, &quantities, &study.model, |position, unstable, values| {
+                let first = [*branch as f64, position as f64, unstable as f64];
+                found.iter_mut().zip(first.iter().chain(values)).for_each(|(column, value)| column.push(*value));
+            })?;
+            if found[0].len() as u64 - before != (reach[1] - reach[0] + 1) as u64 {
+                // Points were removed since the last look: the next one begins an epoch.
+                return Ok(frame(&json!({ "restart": true, "epoch": now }), &[]));
+            }
+        }
+        let rows = found[0].len() as u64;
+        let next = since.saturating_add(rows);
+        let header = json!({ "epoch": now, "columns": columns, "rows": rows, "next": next, "more": next < last });
+        Ok(frame(&header, &found))
+    }
+
+    /// Returns a frame of one solution; `None` if there is no such point.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn solution(&self, branch: i64, place: Place) -> Result<Option<Vec<u8>>, RunFileError> {
+        let (study, quantities) = self.about();
+        let reading = Reading::open(&self.0.folder)?;
+        let point = match place {
+            Place::Position(position) => reading.point(branch, position)?,
+            Place::Special(index) => reading.special_point(branch, index)?.map(|special| special.point),
+        };
+        Ok(point.map(|point| {
+            let (header, columns) = solution(&study.model, &quantities, &point);
+            frame(&header, &columns)
+        }))
+    }
+
+    fn growing(&self) -> MutexGuard<'_, Growing> {
+        self.0.growing.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Growing {
+    fn notice(&self) -> Notice {
+        let Growing { version, log, written, .. } = self;
+        Notice { epoch: log.epoch(), version: *version, points: log.points(), running: *written }
+    }
+}
+
+fn stamp(folder: &Path) -> Stamp {
+    let path = path_in(folder);
+    let mut log = path.clone().into_os_string();
+    log.push("-wal");
+    [path, log.into()]
+        .map(|path| std::fs::metadata(path).ok().and_then(|data| Some((data.modified().ok()?, data.len()))))
+}
