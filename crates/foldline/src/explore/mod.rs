@@ -11,7 +11,7 @@
 //! | how large are the states? | `sizes` |
 //! | how often is the vector field evaluated? | `counted` |
 //! | how is a run interrupted immediately? | `interrupt` |
-//! | where do first solutions come from? | [`seeds`] |
+//! | where do first solutions come from? | [`seeds`], those of maps `maps` |
 //! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
@@ -41,6 +41,7 @@ pub mod homotopy;
 mod interrupt;
 pub mod known;
 mod lookout;
+mod maps;
 mod minimal;
 pub mod persistence;
 pub mod plan;
@@ -67,6 +68,7 @@ pub use plan::{
     SweepPlan, Switching,
 };
 pub use seeds::{attractors, first_solution};
+pub use maps::iterates;
 pub use sizes::{scales_from, state_scales};
 pub use system::System;
 

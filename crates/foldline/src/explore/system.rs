@@ -228,7 +228,8 @@ impl<'a> System<'a> {
         let mut found = Vec::new();
         for bits in 1..1usize << n {
             let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let holds = [equivariant(&reflection, 0.0), forced && equivariant(&reflection, 0.5)];
+            let later = forced && !self.field.iterated();
+            let holds = [equivariant(&reflection, 0.0), later && equivariant(&reflection, 0.5)];
             if holds.contains(&true) {
                 found.push(reflection);
                 mirrors.push(holds);

@@ -23,7 +23,7 @@
 //! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
 use super::normal_form::Local;
-use super::{cycle_form, fold};
+use super::{cycle_form, fold, map_form};
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Ending, Family, Kind, Point};
 use crate::linalg::dot;
@@ -88,7 +88,11 @@ impl CodimensionTwo<'_> {
     /// Normal-form coefficient of the bifurcation of cycles that is continued.
     fn coefficient(&self, at: &Point) -> Option<f64> {
         let (field, scales, parameters) = (self.field, self.scales, at.parameters.clone());
-        cycle_form::coefficient(self.held, Setting { field, scales, parameters, axes: Vec::new() }, at)
+        let setting = Setting { field, scales, parameters, axes: Vec::new() };
+        if field.iterated() {
+            return map_form::coefficient(self.held, &setting, at);
+        }
+        cycle_form::coefficient(self.held, setting, at)
     }
 
     fn tested(&self, reference: &Point, at: &Point) -> Option<f64> {
