@@ -68,6 +68,7 @@ class Parts:
         period: Any,
         whirl: str | Sequence[str] | None,
         totals: Mapping[str, Mapping[str, Any]] | None,
+        map: bool = False,
     ) -> None:
         if states is None:
             states = list(equations or {})
@@ -82,6 +83,7 @@ class Parts:
         self.forcing = {"frequency": frequency, "period": period}
         self.whirl = whirl.replace(",", " ").split() if isinstance(whirl, str) else whirl
         self.totals = dict(totals or {})
+        self.map = map
         self.arguments = (Symbols("state", list(self.states)), Symbols("parameter", list(self.parameters)), Symbol("t"))
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
@@ -118,11 +120,11 @@ class Parts:
         lines += _table("forcing", forcing)
         lines += _table("definitions", {**definitions, **writer.definitions})
         for state, about in self.states.items():
-            equation = {"equation": own_equations[state]} if state in own_equations else {}
+            equation = {"equation": own_equations[state]} if state in own_equations and not self.map else {}
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
         # Equations of unknown states are reported by the reader.
-        extra = {state: text for state, text in own_equations.items() if state not in self.states}
-        lines += _table("equations", extra)
+        extra = {state: text for state, text in own_equations.items() if self.map or state not in self.states}
+        lines += _table("map" if self.map else "equations", extra)
         lines += _table("totals", self.totals)
         lines += _table("outputs", outputs)
         return "\n".join(lines) + "\n"

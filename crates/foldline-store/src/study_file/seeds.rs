@@ -157,7 +157,11 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
         ("equilibrium", _) => {
             if model.iterated() {
                 let hint = "use `attractor = \"fixed-point\"`, or `\"cycle\"` for a cycle of any number of iterates";
-                walk.report(value.span(), "the model is a map and has fixed points and cycles, but no equilibria", hint);
+                walk.report(
+                    value.span(),
+                    "the model is a map and has fixed points and cycles, but no equilibria",
+                    hint,
+                );
             } else if model.forced() {
                 let hint = "use `attractor = \"cycle\"`: the response to forcing is a cycle";
                 walk.report(value.span(), "the model is forced and has no equilibria", hint);

@@ -59,9 +59,7 @@ pub fn survey_by_simulation(
             let mut own = parameters.to_vec();
             own[free] = value;
             let of = sampling.uniform();
-            let share = |number: usize| {
-                (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of })
-            };
+            let share = |number: usize| (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of });
             if trial.field.iterated() {
                 let found = iterated::settled(trial, &own, &starts, free).into_iter().enumerate();
                 let found = grouped(trial, found.map(|(k, own)| Response { share: share(k), ..own }).collect());

@@ -141,9 +141,7 @@ impl Iteration<'_> {
                 }
             }
             let lanes = open.len();
-            states = (0..n * going.len())
-                .map(|c| states[c / going.len() * lanes + going[c % going.len()].0])
-                .collect();
+            states = (0..n * going.len()).map(|c| states[c / going.len() * lanes + going[c % going.len()].0]).collect();
             open = going.into_iter().map(|(_, name)| name).collect();
             self.rolled(&mut states, open.len());
         }
@@ -177,12 +175,14 @@ impl Iteration<'_> {
         }
         let bounded = |l: &usize| (0..n).all(|i| next[i * lanes + l].abs() < Response::UNBOUNDED);
         for l in (0..lanes).filter(|l| !bounded(l)) {
-            let states = if lane(&next, n, l).iter().all(|x| x.is_finite()) { lane(&next, n, l) } else { lane(&states, n, l) };
+            let states =
+                if lane(&next, n, l).iter().all(|x| x.is_finite()) { lane(&next, n, l) } else { lane(&states, n, l) };
             found[open[l]] = Some(Ended { motion: Motion::Escaped, period: 0, time, states, error: f64::NAN });
         }
         let kept: Vec<usize> = (0..lanes).filter(bounded).collect();
         *open = kept.iter().map(|l| open[*l]).collect();
-        let mut rest: Vec<f64> = (0..n).flat_map(|i| kept.iter().map(move |l| (i, *l))).map(|(i, l)| next[i * lanes + l]).collect();
+        let mut rest: Vec<f64> =
+            (0..n).flat_map(|i| kept.iter().map(move |l| (i, *l))).map(|(i, l)| next[i * lanes + l]).collect();
         if rolled {
             self.rolled(&mut rest, kept.len());
         }
@@ -216,9 +216,7 @@ impl Iteration<'_> {
     fn candidate(&self, states: &[f64], period: usize) -> Candidate {
         let n = self.n();
         let count = states.len() / n;
-        let first = (count - 1 - period..count - 1)
-            .min_by(|a, b| states[a * n].total_cmp(&states[b * n]))
-            .unwrap_or(0);
+        let first = (count - 1 - period..count - 1).min_by(|a, b| states[a * n].total_cmp(&states[b * n])).unwrap_or(0);
         let mut own = states[first * n..(first + 1) * n].to_vec();
         let mut x = own.clone();
         for _ in 0..period {
@@ -265,7 +263,8 @@ fn same(iteration: &Iteration, a: &Point, b: &Point, tolerance: f64) -> bool {
         && (0..count).any(|shift| {
             (0..count).all(|k| {
                 let other = (k + shift) % count;
-                iteration.apart(&a.profile[k * n..(k + 1) * n], &b.profile[other * n..(other + 1) * n]) < 30.0 * tolerance
+                iteration.apart(&a.profile[k * n..(k + 1) * n], &b.profile[other * n..(other + 1) * n])
+                    < 30.0 * tolerance
             })
         })
 }

@@ -53,9 +53,9 @@ impl Line {
             axes: both.into_iter().map(|index| self.axis(system, index)).collect(),
         };
         if system.field.iterated() {
-            let condition = self.held.and_then(|(kind, _)| {
-                special::condition::condition(kind, setting.clone(), degree, &point.solution)
-            });
+            let condition = self
+                .held
+                .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
             let surface = Box::new(MapProblem::like(setting, &point.solution));
             return match condition {
                 Some(condition) => Box::new(Held::new(surface, condition)),
@@ -488,7 +488,8 @@ impl Growth<'_> {
         };
         let mut marks: Vec<Box<dyn Monitor>> =
             self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
-        let on_surfaces = branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium));
+        let on_surfaces =
+            branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium));
         if !on_surfaces && !system.field.iterated() {
             marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
         }

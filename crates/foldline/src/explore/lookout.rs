@@ -2,8 +2,8 @@
 
 use super::System;
 use super::choice::summary;
-use super::maps;
 use super::growth::{polished, setting, settings};
+use super::maps;
 use super::plan::ExplorePlan;
 use super::seeds::{attractors, bare, sampling};
 use crate::diagram::{Point, Shown, Solution};

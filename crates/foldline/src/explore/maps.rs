@@ -110,9 +110,12 @@ fn same(system: &System, a: &Point, b: &Point, tolerance: f64) -> bool {
     let n = system.field.dim().max(1);
     a.profile.len() == b.profile.len()
         && a.profile.iter().zip(&b.profile).enumerate().all(|(c, (x, y))| {
-            let off = system.field.periods().get(c % n).filter(|period| period.is_finite()).map_or(x - y, |period| {
-                (x - y) - period * ((x - y) / period).round()
-            });
+            let off = system
+                .field
+                .periods()
+                .get(c % n)
+                .filter(|period| period.is_finite())
+                .map_or(x - y, |period| (x - y) - period * ((x - y) / period).round());
             off.abs() <= 30.0 * tolerance * (system.scales[c % n] + x.abs())
         })
 }

@@ -62,13 +62,13 @@ mod tests;
 mod tests_identity;
 
 pub use given::mismatch;
+pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
     SweepPlan, Switching,
 };
 pub use seeds::{attractors, first_solution};
-pub use maps::iterates;
 pub use sizes::{scales_from, state_scales};
 pub use system::System;
 

@@ -122,7 +122,11 @@ impl<'a> System<'a> {
         let state = |k: usize| self.scales.get(k).copied().unwrap_or(1.0);
         match quantity {
             Quantity::Parameter(index) => self.unit(index),
-            Quantity::Iterate(k, _) | Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => state(k),
+            Quantity::Iterate(k, _)
+            | Quantity::Smallest(k)
+            | Quantity::Largest(k)
+            | Quantity::Mean(k)
+            | Quantity::Rms(k) => state(k),
             Quantity::Norm(_) => self.scales.iter().fold(0.0, |most, scale| scale.max(most)),
             Quantity::Integral(_) => 1.0,
             Quantity::Period => 0.0,

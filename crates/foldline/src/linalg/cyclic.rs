@@ -289,9 +289,14 @@ mod tests {
                 }
             }
             dense[count * n * size..].copy_from_slice(&border);
-            let system =
-                Cyclic::new(Parts { shape: [n, q], blocks: &blocks, closure: &closure, columns: &columns, border: &border })
-                    .unwrap();
+            let system = Cyclic::new(Parts {
+                shape: [n, q],
+                blocks: &blocks,
+                closure: &closure,
+                columns: &columns,
+                border: &border,
+            })
+            .unwrap();
             let x: Vec<f64> = (0..size).map(|k| number(k + 3)).collect();
             let rhs: Vec<f64> = dense.chunks_exact(size).map(|row| product(row, &x)).collect();
             let back: Vec<f64> = (0..size).map(|c| (0..size).map(|r| dense[r * size + c] * x[r]).sum()).collect();

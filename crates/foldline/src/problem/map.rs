@@ -207,15 +207,12 @@ impl ZeroProblem for MapProblem<'_> {
         self.linearise(u);
         let (n, k, size) = (self.n(), self.setting.freedom(), self.size());
         let (blocks, scale) = (self.scaled_blocks(), &self.scale);
-        let columns: Vec<f64> =
-            self.last.by_parameter.iter().enumerate().map(|(c, g)| g / scale[c / k % n]).collect();
+        let columns: Vec<f64> = self.last.by_parameter.iter().enumerate().map(|(c, g)| g / scale[c / k % n]).collect();
         // The rows act through the inner product, which measures states in their scales.
         let weight = |c: usize| if c < size { 1.0 / (scale[c % n] * size as f64) } else { 1.0 };
-        let border: Vec<f64> =
-            rows.iter().enumerate().map(|(at, row)| row * weight(at % (size + k))).collect();
+        let border: Vec<f64> = rows.iter().enumerate().map(|(at, row)| row * weight(at % (size + k))).collect();
         let closure: Vec<f64> = (0..n * n).map(|c| if c % (n + 1) == 0 { 1.0 } else { 0.0 }).collect();
-        let parts =
-            Parts { shape: [n, k], blocks: &blocks, closure: &closure, columns: &columns, border: &border };
+        let parts = Parts { shape: [n, k], blocks: &blocks, closure: &closure, columns: &columns, border: &border };
         self.system = Cyclic::new(parts)?;
         Ok(())
     }
@@ -279,14 +276,7 @@ impl ZeroProblem for MapProblem<'_> {
         let mean = |own: &Vec<f64>, power: i32| own.iter().map(|x| x.powi(power)).sum::<f64>() / own.len() as f64;
         let averages = values.iter().map(|own| [mean(own, 1), mean(own, 2)]).collect();
         let ranges = values.iter().map(range).collect();
-        Examination {
-            spectrum,
-            trivial: 0,
-            unstable,
-            ranges,
-            averages,
-            trust: Trust { residual, ..Trust::default() },
-        }
+        Examination { spectrum, trivial: 0, unstable, ranges, averages, trust: Trust { residual, ..Trust::default() } }
     }
 
     fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {

@@ -166,14 +166,49 @@ fn ends<'n>(orbit: &Orbit, null: &'n Null) -> (&'n [Complex64], &'n [Complex64])
     (&null.v[..orbit.n], &null.w[null.w.len() - orbit.n..])
 }
 
-/// v and w with the normalisation of (1) to (5).
-fn normalised(orbit: &Orbit, null: &Null) -> Option<(Course, Course)> {
+/// v with the normalisation and the orientation of (1) to (5).
+fn oriented(orbit: &Orbit, null: &Null) -> Option<Course> {
     let (n, scales) = (orbit.n, orbit.setting.scales);
     let q = &null.v[..n];
     let norm = q.iter().zip(scales).map(|(z, s)| (z * s).norm_sqr()).sum::<f64>().sqrt();
     let largest = (0..n).max_by(|a, b| q[*a].norm().total_cmp(&q[*b].norm()))?;
     let turn = q[largest] / q[largest].norm();
     let v: Course = null.v.iter().map(|z| z / (turn * norm)).collect();
+    v.iter().all(|z| z.is_finite()).then_some(v)
+}
+
+/// a of (1) at a point of a curve of folds, with v oriented as at `reference`, where it may be oriented in any way: a
+/// smooth function along the curve.
+pub fn quadratic_near(setting: &Setting, reference: &Point, at: &Point) -> Option<f64> {
+    let vectors = |point: &Point| -> Option<(Course, f64)> {
+        let Solution::Cycle(cycle) = &point.solution else { return None };
+        let orbit = Orbit::new(setting, &cycle.profile, &point.parameters);
+        let (null, _) = critical(&orbit, Complex64::ONE)?;
+        let unit = |x: &Course| {
+            let norm = x.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            x.iter().map(|z| z / norm).collect::<Course>()
+        };
+        let (v, w) = (unit(&null.v), unit(&null.w));
+        // Both signs are fixed by the product that does not vanish at a simple multiplier.
+        let value = hermitian(&w, &orbit.multilinear(&[&v, &v])).re;
+        let sign = ends(&orbit, &Null { v: v.clone(), w: w.clone(), g: null.g });
+        let sign = hermitian(sign.1, sign.0).re.signum();
+        Some((v, value * sign))
+    };
+    let (before, _) = vectors(reference)?;
+    let (now, value) = vectors(at)?;
+    Some(value * hermitian(&before, &now).re.signum())
+}
+
+/// True if the multiplier 1 is simple.
+pub fn is_simple(setting: &Setting, at: &Point) -> bool {
+    simplicity(Kind::Fold, setting, at).is_some_and(|simple| simple > DOUBLE)
+}
+
+/// v and w with the normalisation of (1) to (5).
+fn normalised(orbit: &Orbit, null: &Null) -> Option<(Course, Course)> {
+    let n = orbit.n;
+    let v = oriented(orbit, null)?;
     let (_, p) = ends(orbit, null);
     let size = hermitian(p, &v[..n]).conj();
     let w: Course = null.w.iter().map(|z| z / size).collect();
@@ -192,7 +227,7 @@ pub fn antiperiodic(setting: &Setting, at: &Point) -> Option<Vec<f64>> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let orbit = Orbit::new(setting, &cycle.profile, &at.parameters);
     let (null, _) = critical(&orbit, (-1.0).into())?;
-    let (v, _) = normalised(&orbit, &null)?;
+    let v = oriented(&orbit, &null)?;
     Some(v.iter().enumerate().map(|(c, z)| z.re * setting.scales[c % orbit.n]).collect())
 }
 

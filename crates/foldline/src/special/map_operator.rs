@@ -117,8 +117,7 @@ impl<'s, 'a> Orbit<'s, 'a> {
                 }
             }
         }
-        let parts =
-            Parts { shape: [wide, q], blocks: &blocks, closure: &closure, columns: &columns, border: &border };
+        let parts = Parts { shape: [wide, q], blocks: &blocks, closure: &closure, columns: &columns, border: &border };
         Cyclic::new(parts).ok()
     }
 
