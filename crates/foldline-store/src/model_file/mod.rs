@@ -184,6 +184,8 @@ impl Reader<'_> {
             let base = name.trim_end_matches('\'');
             let hint = format!("write `{base} = \"…\"`, the next value of `{base}`");
             self.walk.report(place.clone(), format!("`{name}` is not the name of a state"), hint);
+            // Otherwise the state would be reported as well, as one without an equation.
+            self.incomplete = true;
         }
     }
 
