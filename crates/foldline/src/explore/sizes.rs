@@ -40,7 +40,7 @@ const STEADY: f64 = 2.0;
 const SLOW: f64 = 3.0;
 /// Initial value of a state that is 0, so that it can leave a saddle.
 const ASIDE: f64 = 1e-30;
-/// The same for a map, whose orbits may escape from far away states at once.
+/// Initial value of such a state of a map, whose orbits may escape from far away states at once.
 const BESIDE: f64 = 1e-3;
 /// Magnitude below which a state counts as 0: ten decades above [`ASIDE`], for growth that decays again.
 const NOTHING: f64 = 1e-20;

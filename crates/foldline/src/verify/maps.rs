@@ -11,7 +11,7 @@
 //!   (2)  (D - 1) Δ + F_λ Δλ = -(F(x_0) - x_0),   t·(Δ, Δλ) = 0     next to a special point, t the tangent of the branch
 //! ```
 //!
-//! **Fails when** D expands so much that its rounding errors exceed the stated errors; that is said, not decided.
+//! **Fails when** D expands so much that its rounding errors exceed the stated errors; such points count as undecided.
 
 use super::{Check, Quantity, Undecided, Verified};
 use crate::contract::{Batch, Parameters};
@@ -23,7 +23,7 @@ use num_complex::Complex64;
 /// Largest relative entry of D, in scaled states, for which the composed map is used: eight digits are left.
 const LARGEST: f64 = 1e8;
 /// Relative rounding error of a comparison.
-const ROUNDING: f64 = 1e-11;
+const ROUNDING: f64 = 1e-13;
 /// Number of Newton steps.
 const STEPS: usize = 6;
 /// |1 - μ| below which the cycle is not isolated to working precision.
