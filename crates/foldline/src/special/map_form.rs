@@ -191,8 +191,7 @@ pub fn quadratic_near(setting: &Setting, reference: &Point, at: &Point) -> Optio
         let (v, w) = (unit(&null.v), unit(&null.w));
         // Both signs are fixed by the product that does not vanish at a simple multiplier.
         let value = hermitian(&w, &orbit.multilinear(&[&v, &v])).re;
-        let sign = ends(&orbit, &Null { v: v.clone(), w: w.clone(), g: null.g });
-        let sign = hermitian(sign.1, sign.0).re.signum();
+        let sign = hermitian(&w[w.len() - orbit.n..], &v[..orbit.n]).re.signum();
         Some((v, value * sign))
     };
     let (before, _) = vectors(reference)?;
