@@ -180,13 +180,16 @@ fn coarsened(cycle: &Cycle) -> Cycle {
     Cycle { mesh, profile, ..cycle.clone() }
 }
 
+/// Problem, unknowns, and direction in which to leave.
+type Doubled<'a> = (Box<dyn ZeroProblem + 'a>, Vec<f64>, Vec<f64>);
+
 /// Returns the problem of doubled cycles at a period doubling, the cycle over two turns, and the direction to leave.
 fn double<'a>(
     system: &'a System,
     free: usize,
     at: &SpecialPoint,
     cycle: &Cycle,
-) -> Option<(Box<dyn ZeroProblem + 'a>, Vec<f64>, Vec<f64>)> {
+) -> Option<Doubled<'a>> {
     let with = |solution: Cycle| Point { solution: Solution::Cycle(solution), ..at.point.clone() };
     if system.field.iterated() {
         let own = setting(system, free, &at.point.parameters);

@@ -107,7 +107,8 @@ impl Cyclic {
             }
             let turn = triangularised(&mut stack, 2 * n, full, n);
             let upper = stack[..n * full].to_vec();
-            if (0..n).any(|i| !(upper[i * full + i].abs() > 1e-300)) {
+            let usable = |i: usize| upper[i * full + i].abs() > 1e-300;
+            if !(0..n).all(usable) {
                 return Err(Singular);
             }
             let multipliers = eliminated(&mut border, &upper, [n, q, j, count, width]);
