@@ -134,12 +134,18 @@ fn special_points_and_coefficients_agree_with_the_reference() {
 #[test]
 fn stated_errors_of_places_with_closed_forms_are_true() {
     let diagram = diagram("logistic");
-    let closed = [("fixed", 3.0), ("fixed/period-doubling-1", 1.0 + 6f64.sqrt()), ("three iterates", 1.0 + 8f64.sqrt())];
+    let closed =
+        [("fixed", 3.0), ("fixed/period-doubling-1", 1.0 + 6f64.sqrt()), ("three iterates", 1.0 + 8f64.sqrt())];
     for (name, known) in closed {
         let branch = diagram.branch(name).unwrap();
         let off = |special: &&SpecialPoint| (value(branch, special) - known).abs();
         let special = branch.special.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
-        assert!(off(&special) <= special.error * branch.size(known), "{name}: {:e}, {:e}", off(&special), special.error);
+        assert!(
+            off(&special) <= special.error * branch.size(known),
+            "{name}: {:e}, {:e}",
+            off(&special),
+            special.error
+        );
     }
 }
 
@@ -185,7 +191,10 @@ fn curves_in_two_parameters_follow_their_closed_forms_and_name_their_points() {
         assert!(curve.points.len() > 5, "{name}");
         for point in &curve.points {
             let [alpha, beta] = point.parameters[..] else { panic!() };
-            assert!((alpha - factor * (1.0 + beta).powi(2)).abs() < 1e-9 * (1.0 + alpha.abs()), "{name}: {alpha} {beta}");
+            assert!(
+                (alpha - factor * (1.0 + beta).powi(2)).abs() < 1e-9 * (1.0 + alpha.abs()),
+                "{name}: {alpha} {beta}"
+            );
         }
         let found: Vec<Kind> = curve.special.iter().map(|s| s.kind).filter(|k| k.has_codimension_two()).collect();
         assert_eq!(found, [resonance], "{name}");
@@ -198,12 +207,8 @@ fn curves_in_two_parameters_follow_their_closed_forms_and_name_their_points() {
     found.retain(|(kind, _)| kind.has_codimension_two());
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     // cos θ = 1, 0, -½, -1.
-    let expected = [
-        (Kind::Resonance11, -1.0),
-        (Kind::Resonance14, 0.0),
-        (Kind::Resonance13, 1.25),
-        (Kind::Resonance12, 3.0),
-    ];
+    let expected =
+        [(Kind::Resonance11, -1.0), (Kind::Resonance14, 0.0), (Kind::Resonance13, 1.25), (Kind::Resonance12, 3.0)];
     assert_eq!(found.len(), expected.len(), "{found:?}");
     for ((kind, alpha), (wanted, known)) in found.iter().zip(expected) {
         assert!(*kind == wanted && (alpha - known).abs() < 1e-7, "{found:?}");
@@ -356,7 +361,8 @@ fn orbits_are_simulated_and_attractors_listed() {
     std::fs::write(folder.path().join("m.toml"), model("r = 3.83", &[("x", "r*x*(1 - x)")], "[0, 1]")).unwrap();
     let output = foldline(folder.path(), &["simulate", "m.toml", "--start", "x=0.3", "--time", "2", "--format", "csv"]);
     let said = text(&output);
-    let rows: Vec<Vec<f64>> = said.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+    let rows: Vec<Vec<f64>> =
+        said.lines().skip(1).map(|l| l.split(',').map(|v| v.parse().unwrap()).collect()).collect();
     let next = 3.83 * 0.3 * 0.7;
     assert_eq!(rows.len(), 3, "{said}");
     assert!((rows[1][1] - next).abs() < 1e-15 && (rows[2][1] - 3.83 * next * (1.0 - next)).abs() < 1e-15, "{said}");

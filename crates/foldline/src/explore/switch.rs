@@ -184,12 +184,7 @@ fn coarsened(cycle: &Cycle) -> Cycle {
 type Doubled<'a> = (Box<dyn ZeroProblem + 'a>, Vec<f64>, Vec<f64>);
 
 /// Returns the problem of doubled cycles at a period doubling, the cycle over two turns, and the direction to leave.
-fn double<'a>(
-    system: &'a System,
-    free: usize,
-    at: &SpecialPoint,
-    cycle: &Cycle,
-) -> Option<Doubled<'a>> {
+fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Option<Doubled<'a>> {
     let with = |solution: Cycle| Point { solution: Solution::Cycle(solution), ..at.point.clone() };
     if system.field.iterated() {
         let own = setting(system, free, &at.point.parameters);
