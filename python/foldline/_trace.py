@@ -120,11 +120,11 @@ class Parts:
         lines += _table("forcing", forcing)
         lines += _table("definitions", {**definitions, **writer.definitions})
         for state, about in self.states.items():
-            equation = {"equation": own_equations[state]} if state in own_equations and not self.map else {}
+            equation = {"equation": own_equations[state]} if state in own_equations else {}
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
         # Equations of unknown states are reported by the reader.
-        extra = {state: text for state, text in own_equations.items() if self.map or state not in self.states}
-        lines += _table("map" if self.map else "equations", extra)
+        extra = {state: text for state, text in own_equations.items() if state not in self.states}
+        lines += _table("map" if self.map else "equations", extra) or (["", "[map]"] if self.map else [])
         lines += _table("totals", self.totals)
         lines += _table("outputs", outputs)
         return "\n".join(lines) + "\n"
