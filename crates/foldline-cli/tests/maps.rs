@@ -285,7 +285,7 @@ fn a_killed_run_resumes_to_the_same_special_points() {
     std::fs::write(folder.path().join("m.toml"), model("r = 2.5", &[("x", "r*x*(1 - x)")], "[0, 1]")).unwrap();
     let study = "model = \"m.toml\"\ntolerance = 1e-8\n".to_string()
         + &from_fixed("", "r", "[2.5, 3.6]", "switch = { period-doubling = 8 }\n")
-        + "[[survey]]\nname = \"iterates\"\nfree = \"r\"\nrange = [2.5, 4]\ncount = 4001\nstarts = 16\n";
+        + "[[survey]]\nname = \"iterates\"\nfree = \"r\"\nrange = [2.5, 4]\ncount = 801\nstarts = 8\n";
     std::fs::write(folder.path().join("s.toml"), study).unwrap();
     let start = |more: &[&str]| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_foldline"));

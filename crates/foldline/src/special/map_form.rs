@@ -37,6 +37,8 @@ const SAFE: f64 = 3.0;
 const VISIBLE: f64 = 1e-8;
 /// Rounding error of a coefficient, relative to its terms, for each component of the cycle.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Share of its terms below which a coefficient is rounding: a hundred times the error of a point of a curve.
+const NOISE: f64 = 1e-9;
 /// Distance of e^{ikθ} from 1 at which a point is resonant. Order of magnitude: the square root of the smallest error of
 /// a located point.
 const RESONANT: f64 = 1e-6;
@@ -61,9 +63,12 @@ pub fn coefficients(kind: Kind, setting: &Setting, at: &Point, error: f64) -> Co
     measured(kind, setting, at, error).unwrap_or_else(Coefficients::none)
 }
 
-/// Returns the coefficient without an error, for uses that need its sign only.
+/// Returns the coefficient without an error, for uses that need its sign only. One that vanishes up to rounding, as all
+/// along a curve of torus points of area-preserving maps, is taken as positive.
 pub fn coefficient(kind: Kind, setting: &Setting, at: &Point) -> Option<f64> {
-    formula(kind, setting, at, false).ok()?.values.first().copied()
+    let found = formula(kind, setting, at, false).ok()?;
+    let (value, noise) = (*found.values.first()?, NOISE * found.terms.first()?);
+    Some(if value.abs() < noise { noise } else { value })
 }
 
 fn measured(kind: Kind, setting: &Setting, at: &Point, error: f64) -> Result<Coefficients, String> {
