@@ -71,6 +71,11 @@ pub fn coefficient(kind: Kind, setting: &Setting, at: &Point) -> Option<f64> {
     Some(if value.abs() < noise { noise } else { value })
 }
 
+/// First coefficient.
+fn value_of(kind: Kind, setting: &Setting, at: &Point) -> Option<f64> {
+    formula(kind, setting, at, false).ok()?.values.first().copied()
+}
+
 fn measured(kind: Kind, setting: &Setting, at: &Point, error: f64) -> Result<Coefficients, String> {
     if kind == Kind::Torus
         && let Some(angle) = angle(at)
@@ -99,7 +104,7 @@ fn measured(kind: Kind, setting: &Setting, at: &Point, error: f64) -> Result<Coe
     }
     if let (true, Some(first)) = (pitchfork, errors.first_mut()) {
         // By symmetry it is 0, or at most the observed value.
-        *first += coefficient(Kind::Fold, setting, at).unwrap_or(f64::INFINITY).abs();
+        *first += value_of(Kind::Fold, setting, at).unwrap_or(f64::INFINITY).abs();
     }
     if own.values.iter().any(|value| !value.is_finite()) {
         return Err("they are not finite".into());
@@ -334,7 +339,7 @@ fn direction(orbit: &Orbit, at: &Point, borders: &Borders) -> Option<Along> {
 /// True if a ξ² is less than c ξ³ at the amplitude at which the quadratic term would still be visible, or if a is zero
 /// within its error.
 fn is_pitchfork(setting: &Setting, at: &Point, error: f64) -> bool {
-    let (Some(a), Some(c)) = (coefficient(Kind::Fold, setting, at), coefficient(Kind::Cusp, setting, at)) else {
+    let (Some(a), Some(c)) = (value_of(Kind::Fold, setting, at), value_of(Kind::Cusp, setting, at)) else {
         return false;
     };
     let scale = setting.scales.iter().fold(0.0f64, |most, s| most.max(*s));
