@@ -218,6 +218,7 @@ impl Iteration<'_> {
         let count = states.len() / n;
         let first = (count - 1 - period..count - 1).min_by(|a, b| states[a * n].total_cmp(&states[b * n])).unwrap_or(0);
         let mut own = states[first * n..(first + 1) * n].to_vec();
+        self.rolled(&mut own, 1);
         let mut x = own.clone();
         for _ in 0..period {
             let mut next = vec![0.0; n];
