@@ -446,6 +446,7 @@ def model(
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
     totals: Mapping[str, Mapping[str, Any]] | None = None,
+    map: bool = False,
     time: str | None = None,
     units: str | None = None,
     name: str = "model",
@@ -464,6 +465,7 @@ def model(
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
     totals: Mapping[str, Mapping[str, Any]] | None = None,
+    map: bool = False,
     time: str | None = None,
     units: str | None = None,
     name: str | None = None,
@@ -484,6 +486,7 @@ def model(
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
     totals: Mapping[str, Mapping[str, Any]] | None = None,
+    map: bool = False,
     time: str | None = None,
     units: str | None = None,
     name: str | None = None,
@@ -500,7 +503,7 @@ def model(
     path : path or str
         The path of a model file, or the text of one, which has line breaks. No other argument is allowed beside it.
     equations : mapping
-        The time derivative of every state.
+        The time derivative of every state; for a map its next value.
     states : str, list or mapping
         Names in order: ``"u v du dv"``. A mapping gives `range` (where initial states are sampled), `scale` (characteristic size),
         `period` (of an angle), `unit` and `description` of each: ``{"u": dict(range=(-5, 5)), "phi": dict(period="2*pi")}``.
@@ -516,8 +519,10 @@ def model(
         The two states of the complex signal from whose spectrum cycles are named 2:1, 3:1 …
     totals : mapping
         Conserved sums of states, which become parameters: ``{"T": dict(sum="x + 2*y", value=1.0)}``.
+    map : bool
+        True for a map: the equations give the next value of every state instead of its time derivative.
     time : str
-        Unit of time; by default it follows from the other units.
+        Unit of time; by default it follows from the other units. For a map, the unit of its steps.
     units : str
         ``"labels"`` leaves units unchecked.
     name, description : str
@@ -555,7 +560,7 @@ def model(
         raise wrong_kind("equations must be a dictionary", equations, 'equations={"x": "y", "y": "-x"}')
     stated = {key: own for key, own in (("time", time), ("units", units)) if own is not None}
     head = "".join(f"{key} = {value(own)}\n" for key, own in stated.items())
-    parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl, totals)
+    parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl, totals, map)
     if equations is not None:
         return _compiled(head + parts.text(equations, name or "model", description or ""), name)
 

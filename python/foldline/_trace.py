@@ -68,6 +68,7 @@ class Parts:
         period: Any,
         whirl: str | Sequence[str] | None,
         totals: Mapping[str, Mapping[str, Any]] | None,
+        map: bool = False,
     ) -> None:
         if states is None:
             states = list(equations or {})
@@ -82,6 +83,7 @@ class Parts:
         self.forcing = {"frequency": frequency, "period": period}
         self.whirl = whirl.replace(",", " ").split() if isinstance(whirl, str) else whirl
         self.totals = dict(totals or {})
+        self.map = map
         self.arguments = (Symbols("state", list(self.states)), Symbols("parameter", list(self.parameters)), Symbol("t"))
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
@@ -122,7 +124,7 @@ class Parts:
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
         # Equations of unknown states are reported by the reader.
         extra = {state: text for state, text in own_equations.items() if state not in self.states}
-        lines += _table("equations", extra)
+        lines += _table("map" if self.map else "equations", extra) or (["", "[map]"] if self.map else [])
         lines += _table("totals", self.totals)
         lines += _table("outputs", outputs)
         return "\n".join(lines) + "\n"

@@ -121,6 +121,9 @@ fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     };
     let [low, high] = around(free.value);
     let (attractor, switch, found) = match model.forced() {
+        true if model.iterated() => {
+            ("cycle", "period-doubling = 2", "the cycle or fixed point that orbits reach at the values of the model")
+        }
         true => ("cycle", "period-doubling = 1", "the cycle that trajectories reach at the values of the model"),
         false => (
             "equilibrium",

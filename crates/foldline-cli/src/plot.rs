@@ -4,6 +4,7 @@ use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::table::{Run, conversion, read};
 use crate::verbosity::report;
+use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::quantity::{default_x, default_y, label};
@@ -17,7 +18,12 @@ const SCALE: f32 = 2.0;
 
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
-    let Run { mut model, mut diagram, .. } = read(&typed.folder, Part::Numbers)?;
+    let mut run = read(&typed.folder, Part::Numbers)?;
+    if run.model.iterated() {
+        // Iterates are drawn, which are part of the profiles.
+        run = read(&typed.folder, Part::Everything)?;
+    }
+    let Run { mut model, mut diagram, .. } = run;
     if let Some(conversion) = conversion(&model, &typed.unit)? {
         (diagram, model) = (conversion.diagram(diagram), conversion.model().clone());
     }

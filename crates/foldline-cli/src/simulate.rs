@@ -102,6 +102,7 @@ fn end(typed: &Typed, model: &Model, parameters: &[f64]) -> Result<f64, Failure>
 /// Times at which the trajectory is printed.
 fn times(typed: &Typed, model: &Model, parameters: &[f64], end: f64) -> Result<Vec<f64>, Failure> {
     let every = match typed.every.as_deref() {
+        None if model.iterated() => 1.0,
         None => end / ROWS,
         Some("period") if model.forced() => model.time_unit(parameters),
         Some(text) => measured(text, &model.time).filter(|t| *t > 0.0).ok_or_else(|| {
@@ -171,7 +172,8 @@ impl Shown<'_> {
     }
 
     fn table(&self) -> Table {
-        let mut columns = vec![Column::in_unit("t", Style::Number, &self.model.time)];
+        let time = if self.model.iterated() { "k" } else { "t" };
+        let mut columns = vec![Column::in_unit(time, Style::Number, &self.model.time)];
         columns.extend(self.columns.iter().map(|own| {
             let [name, unit] = self.head(*own);
             Column::in_unit(name, Style::Number, unit)
@@ -191,7 +193,8 @@ impl Shown<'_> {
             "" | "1" | "-" => foldline_plot::quantity::with_greek(name),
             _ => format!("{} [{unit}]", foldline_plot::quantity::with_greek(name)),
         };
-        let x = across.map_or(label(["t", &self.model.time]), |own| label(self.head(own)));
+        let time = if self.model.iterated() { "k" } else { "t" };
+        let x = across.map_or(label([time, &self.model.time]), |own| label(self.head(own)));
         let shown: Vec<Variable> = self.columns.iter().copied().filter(|own| Some(*own) != across).collect();
         let y = match shown[..] {
             [one] => label(self.head(one)),
@@ -202,6 +205,7 @@ impl Shown<'_> {
             let points: Vec<[f64; 2]> = (0..self.course.times.len()).map(|k| [at(k), self.value(*own, k)]).collect();
             // Samples taken once per period do not lie on a curve.
             let layer = match typed.every.as_deref() {
+                _ if self.model.iterated() => Layer::scatter(points, Marker::Dot, palette::nth(i)).wide(1.6),
                 Some("period") => Layer::scatter(points, Marker::Dot, palette::nth(i)).wide(1.6),
                 _ => Layer::curve(&points, palette::nth(i)).smooth(),
             };

@@ -171,7 +171,7 @@ fn unsupported_features_are_explained() {
         refused(folder.path(), &["check", "study.toml"])
     };
     let expected: [(&str, &[&str]); 9] = [
-        ("map = true", &["study.toml:2:1", "maps are not supported", "MatContM"]),
+        ("map = true", &["study.toml:2:1", "[map] takes the place of [equations]", "next value"]),
         ("boundary-conditions = []", &["boundary-value problems", "AUTO-07p"]),
         ("delays = [1]", &["delay differential equations", "DDE-BIFTOOL"]),
         ("torus = 1", &["invariant tori", "[[curve]]"]),

@@ -42,6 +42,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "first-model",
         "from-auto",
         "how-to",
+        "maps",
         "tutorial-forced-oscillator",
         "tutorial-neuron",
         "tutorial-rotor",

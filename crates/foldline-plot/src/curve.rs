@@ -47,6 +47,22 @@ pub fn cut(stretches: &[Vec<Vertex>], scale: Option<[f64; 2]>) -> Vec<Piece> {
 /// Vertices of a branch, points and special points in order, interrupted where a point has no value; each with the
 /// stability of the segment that leads to it.
 pub fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
+    each_iterate(branch, y).flat_map(|y| one_line(branch, x, y)).collect()
+}
+
+/// The quantity, or for iterates of a map one quantity for each.
+fn each_iterate(branch: &Branch, y: Quantity) -> impl Iterator<Item = Quantity> {
+    let count = match y {
+        Quantity::Iterate(..) => branch.points.iter().map(|p| p.solution.forcing_periods()).max().unwrap_or(1).max(1),
+        _ => 1,
+    };
+    (0..count as usize).map(move |number| match y {
+        Quantity::Iterate(state, _) => Quantity::Iterate(state, number),
+        other => other,
+    })
+}
+
+fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     let mut vertices: Vec<Option<Vertex>> = Vec::new();
     // Stability of the segment that leads to the next vertex.
     let mut stable = true;
@@ -133,7 +149,10 @@ pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
 
 /// Special points of a branch that can be drawn: kind, criticality where known, position.
 pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, Option<&'static str>, [f64; 2])> {
-    branch.special.iter().filter_map(|s| Some((s.kind, s.criticality(), place(&s.point, x, y)?))).collect()
+    let of = |y: Quantity| {
+        branch.special.iter().filter_map(move |s| Some((s.kind, s.criticality(), place(&s.point, x, y)?)))
+    };
+    each_iterate(branch, y).flat_map(of).collect()
 }
 
 fn place(point: &Point, x: Quantity, y: Quantity) -> Option<[f64; 2]> {

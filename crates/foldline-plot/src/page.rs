@@ -39,7 +39,12 @@ pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
     let [width, height] = picture.size;
     let title = if picture.title.is_some() { 31.0 } else { 0.0 };
     let mut layers = diagram_layers(diagram, x, y);
-    layers.extend(response_layers(diagram, x, y, root_count(diagram)));
+    let responses = response_layers(diagram, x, y, root_count(diagram));
+    match y {
+        // Behind the branches: there are many.
+        Quantity::Iterate(..) => layers = responses.into_iter().chain(layers).collect(),
+        _ => layers.extend(responses),
+    }
     layers.extend(label_layers(diagram, x, y));
     let panel = Panel {
         layers,

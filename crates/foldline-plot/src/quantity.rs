@@ -1,16 +1,19 @@
 //! Quantities on the axes.
 
+use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
-/// Returns the quantity of that name: one of [`Quantity::named`], or a state or output, which means its largest value.
+/// Returns the quantity of that name: one of [`Quantity::named`], or a state or output, which means its largest value;
+/// a state of a map means all iterates.
 ///
 /// # Errors
 /// The names that exist.
 pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     let output = || model.output_index(name).map(|index| model.states.len() + index);
-    let bare = || model.state_index(name).or_else(output).map(Quantity::Largest);
+    let iterate = || model.state_index(name).filter(|_| model.iterated()).map(|index| Quantity::Iterate(index, 0));
+    let bare = || iterate().or_else(|| model.state_index(name).or_else(output).map(Quantity::Largest));
     let parameter = model.parameter_index(name).map(Quantity::Parameter);
     parameter.or_else(bare).or_else(|| Quantity::named(name, model)).ok_or_else(|| {
         let parameters = model.parameters.iter().map(|p| p.name.as_str());
@@ -40,9 +43,14 @@ fn is_leg(branch: &Branch) -> bool {
     branch.name.rsplit_once('/').is_some_and(|(_, number)| number.parse::<usize>().is_ok())
 }
 
-/// Default vertical axis: the largest value of the first output, or of the first state if there is no output.
+/// Default vertical axis: the largest value of the first output, or of the first state if there is no output; for a map
+/// all iterates of that state.
 pub fn default_y(model: &Model) -> Quantity {
-    Quantity::Largest(if model.outputs.is_empty() { 0 } else { model.states.len() })
+    match model.outputs.is_empty() {
+        true if model.iterated() => Quantity::Iterate(0, 0),
+        true => Quantity::Largest(0),
+        false => Quantity::Largest(model.states.len()),
+    }
 }
 
 /// Value at a point, if it exists and can be drawn.
@@ -62,6 +70,7 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
         }
         Quantity::Period => (("period", model.time.as_str()), ""),
         Quantity::Norm(_) => (("rms of the state", ""), ""),
+        Quantity::Iterate(index, _) => (variable(index).unwrap_or_default(), ""),
         Quantity::Smallest(index) => (variable(index).unwrap_or_default(), "min "),
         Quantity::Largest(index) => (variable(index).unwrap_or_default(), "max "),
         Quantity::Mean(index) => (variable(index).unwrap_or_default(), "mean "),

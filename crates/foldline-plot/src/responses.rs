@@ -27,12 +27,31 @@ pub fn value(quantity: Quantity, response: &Response) -> Option<f64> {
         Quantity::Period => response.period,
         Quantity::Smallest(k) => response.ranges.get(k).map(|range| range[0]),
         Quantity::Largest(k) => response.ranges.get(k).map(|range| range[1]),
+        Quantity::Iterate(k, number) => {
+            let width = response.ranges.len();
+            response.iterates.get(number * width + k).copied()
+        }
         Quantity::Mean(_) | Quantity::Rms(_) | Quantity::Integral(_) | Quantity::Norm(_) => None,
     };
     found.filter(|value| value.is_finite())
 }
 
+/// All iterates of a survey or sweep of a map as small dots.
+fn iterate_layers(set: &Responses, x: Quantity, state: usize, colour: &'static str) -> Vec<Layer> {
+    let of = |r: &Response| -> Vec<[f64; 2]> {
+        let count = r.iterates.len() / r.ranges.len().max(1);
+        let all = (0..count).map(|number| value(x, r).zip(value(Quantity::Iterate(state, number), r)));
+        all.flatten().map(|(x, y)| [x, y]).collect()
+    };
+    let places: Vec<[f64; 2]> = set.responses.iter().flat_map(of).collect();
+    let layer = Layer::scatter(places, Marker::Dot, colour).wide(0.5).faint(0.5).named(set.name.clone());
+    if layer.is_empty() { Vec::new() } else { vec![layer] }
+}
+
 fn set_layers(set: &Responses, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
+    if let Quantity::Iterate(state, _) = y {
+        return iterate_layers(set, x, state, colour);
+    }
     let at = |r: &Response| {
         let shown = r.motion != Motion::Escaped;
         value(x, r).zip(value(y, r)).filter(|_| shown).map(|(x, y)| [x, y])
@@ -99,6 +118,7 @@ mod tests {
             state: vec![0.0],
             settled_after: 0.0,
             error: 0.0,
+            iterates: Vec::new(),
         };
         let responses = values.iter().enumerate().map(one).collect();
         Responses { name: "s".into(), search: Search::Sweep, free: 0, responses }

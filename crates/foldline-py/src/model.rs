@@ -91,7 +91,7 @@ impl Model {
 
     #[getter]
     fn forced(&self) -> bool {
-        self.model.forced()
+        self.model.forced() && !self.model.iterated()
     }
 
     /// Period of the forcing at parameters `[k]`; 1 for an unforced model.

@@ -97,6 +97,11 @@ fn key(py: Python, model: &Model, name: &str) -> PyResult<AttractorKey> {
     let said = |message: String, cure: &str| Err(failure::of_argument(py, message, cure));
     let ratio = name.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     match (name, ratio) {
+        ("fixed-point", _) if model.model.iterated() => Ok(AttractorKey::Lasting(1)),
+        ("equilibrium", _) if model.model.iterated() => said(
+            "the model is a map and has fixed points and cycles, but no equilibria".into(),
+            "use \"fixed-point\", or \"cycle\" for a cycle of any number of iterates",
+        ),
         ("equilibrium", _) if model.model.forced() => said(
             "the model is forced and has no equilibria".into(),
             "use \"cycle\": the response to forcing is a cycle",

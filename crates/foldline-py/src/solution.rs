@@ -124,7 +124,8 @@ impl Solution {
     fn node_times<'py>(&self, py: Python<'py>) -> Array<'py> {
         let Some(cycle) = self.cycle() else { return numbers(py, [].into_iter()) };
         let scheme = Scheme::new(cycle.degree);
-        let on = |pair: &[f64]| scheme.nodes.iter().map(|c| pair[0] + (pair[1] - pair[0]) * c).collect::<Vec<f64>>();
+        let nodes = &scheme.nodes[..=cycle.degree];
+        let on = |pair: &[f64]| nodes.iter().map(|c| pair[0] + (pair[1] - pair[0]) * c).collect::<Vec<f64>>();
         numbers(py, cycle.mesh.windows(2).flat_map(on).collect::<Vec<f64>>().into_iter())
     }
 

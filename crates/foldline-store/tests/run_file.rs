@@ -122,6 +122,7 @@ fn diagram() -> Diagram {
         state: vec![awkward(4)],
         settled_after: awkward(5),
         error: awkward(0),
+        iterates: Vec::new(),
     };
     let motions = [Motion::Cycle, Motion::Equilibrium, Motion::Other, Motion::Escaped];
     let responses = motions.map(|m| response(m, (m == Motion::Cycle).then_some((2, 1)))).to_vec();

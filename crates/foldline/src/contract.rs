@@ -69,6 +69,12 @@ pub trait VectorField: Send + Sync {
         false
     }
 
+    /// True for a map x_{k+1} = f(x_k, p). One iteration is one unit of the field's time and counts as one forcing
+    /// period, so that the period of a cycle is prescribed: [`VectorField::forced`] is true, and f depends on no time.
+    fn iterated(&self) -> bool {
+        false
+    }
+
     /// Length of one unit of the field's time in the time of the model: 1, or the forcing period at parameters `[k]`.
     fn time_unit(&self, _parameters: &[f64]) -> f64 {
         1.0
@@ -194,6 +200,11 @@ pub trait ZeroProblem {
 
     /// The current mesh; empty for problems without a mesh.
     fn mesh(&self) -> Mesh;
+
+    /// True if the spectrum consists of multipliers, and the unit circle decides on stability.
+    fn has_multipliers(&self) -> bool {
+        !self.mesh().is_empty()
+    }
 
     /// Moves the problem to another mesh.
     fn set_mesh(&mut self, mesh: &Mesh);

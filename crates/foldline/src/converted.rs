@@ -180,6 +180,8 @@ impl Conversion {
         response.value = self.parameters.get(free).map_or(response.value, |how| how.of(response.value, &at));
         self.ranges(&mut response.ranges, &at);
         self.states(&mut response.state, &at);
+        let width = response.ranges.len().max(1);
+        response.iterates.chunks_mut(width).for_each(|iterate| self.states(iterate, &at));
         response.period = response.period.map(|period| self.time.of(period, &at));
         response.settled_after = self.time.of(response.settled_after, &at);
     }

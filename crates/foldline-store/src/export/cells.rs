@@ -133,9 +133,11 @@ pub(super) fn branch_cells(branch: &Branch, model: &Model, points: u64) -> Vec<C
 pub(super) fn profile(point: &Point) -> Option<(Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
     let scheme = Scheme::new(cycle.degree);
+    // An iterate of a map lasts until the next one.
+    let nodes = &scheme.nodes[..=cycle.degree];
     let mut times = Vec::with_capacity(cycle.profile.len() / cycle.dim().max(1) + 1);
     for ends in cycle.mesh.windows(2) {
-        times.extend(scheme.nodes.iter().map(|c| ends[0] + c * (ends[1] - ends[0])));
+        times.extend(nodes.iter().map(|c| ends[0] + c * (ends[1] - ends[0])));
     }
     times.extend(cycle.mesh.last());
     let mut end = cycle.profile[..cycle.dim().min(cycle.profile.len())].to_vec();

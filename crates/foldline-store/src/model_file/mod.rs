@@ -21,7 +21,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 26] = [
+const ROOT_KEYS: [&str; 27] = [
     "name",
     "description",
     "source",
@@ -35,6 +35,7 @@ const ROOT_KEYS: [&str; 26] = [
     "definitions",
     "states",
     "equations",
+    "map",
     "mass",
     "totals",
     "outputs",
@@ -187,7 +188,11 @@ impl Reader<'_> {
         for (name, place, value) in self.entries(root, "definitions") {
             self.definition(name, place, value, &mut source);
         }
-        let equations = self.entries(root, "equations");
+        source.map = root.contains_key("map");
+        let equations = self.entries(root, if source.map { "map" } else { "equations" });
+        if source.map {
+            self.next_states(root, &equations);
+        }
         self.accelerated = equations.iter().filter_map(|(name, ..)| Some(name.strip_suffix("''")?.into())).collect();
         for (name, place, value) in self.entries(root, "states") {
             self.state(name, place, value, &mut source);
@@ -209,6 +214,21 @@ impl Reader<'_> {
         }
         source.whirl = root.get("whirl").and_then(|value| self.whirl(value));
         source
+    }
+
+    /// Reports mistakes in the table of a map.
+    fn next_states(&mut self, root: &DeTable, entries: &Entries) {
+        if let Some(value) = root.get("equations") {
+            let message = "the model has both [equations] and [map]";
+            self.walk.report(value.span(), message, "keep one: [equations] gives rates of change, [map] next values");
+        }
+        for (name, place, _) in entries.iter().filter(|(name, ..)| name.contains('\'')) {
+            let base = name.trim_end_matches('\'');
+            let hint = format!("write `{base} = \"…\"`, the next value of `{base}`");
+            self.walk.report(place.clone(), format!("`{name}` is not the name of a state"), hint);
+            // Otherwise the state would be reported as well, as one without an equation.
+            self.incomplete = true;
+        }
     }
 
     fn entries<'v, 't>(&mut self, root: &'v DeTable<'t>, key: &str) -> Entries<'v, 't> {

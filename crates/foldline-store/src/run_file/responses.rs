@@ -29,9 +29,9 @@ const FIRST: [&str; 15] = [
     "jumped",
     "rowid",
 ];
-/// Columns added later: integers or NULL.
-const LATER: [&str; 3] = ["uniform_hits", "uniform_starts", "jumped"];
-const LAST: [&str; 4] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes"];
+/// Columns added later: integers, the bytes of iterates, or NULL.
+const LATER: [&str; 4] = ["uniform_hits", "uniform_starts", "jumped", "iterate_bytes"];
+const LAST: [&str; 5] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes", "iterate_bytes"];
 
 fn columns(model: &Model) -> Columns {
     Columns::beside(model, &FIRST.into_iter().chain(LAST).collect::<Vec<_>>())
@@ -45,7 +45,7 @@ pub(super) fn create(connection: &Connection, model: &Model) -> rusqlite::Result
     LATER
         .iter()
         .filter(|name| !known.iter().any(|own| own == *name))
-        .try_for_each(|name| connection.execute_batch(&format!("ALTER TABLE responses ADD COLUMN {name} INTEGER")))
+        .try_for_each(|name| connection.execute_batch(&format!("ALTER TABLE responses ADD COLUMN {name}")))
 }
 
 fn tables(model: &Model) -> String {
@@ -59,7 +59,7 @@ fn tables(model: &Model) -> String {
              uniform_hits INTEGER, uniform_starts INTEGER, jumped INTEGER,
              {shown}
              parameter_bytes BLOB NOT NULL, state_bytes BLOB NOT NULL, range_bytes BLOB NOT NULL,
-             scalar_bytes BLOB NOT NULL, PRIMARY KEY (response_set, number));"
+             scalar_bytes BLOB NOT NULL, iterate_bytes BLOB, PRIMARY KEY (response_set, number));"
     )
 }
 
@@ -120,6 +120,7 @@ fn values_of(response: &Response, shown: usize) -> Vec<Value> {
         Value::Blob(pack(&response.state)),
         Value::Blob(pack_pairs(&response.ranges)),
         Value::Blob(pack(&scalars)),
+        if response.iterates.is_empty() { Value::Null } else { Value::Blob(pack(&response.iterates)) },
     ]);
     values
 }
@@ -194,5 +195,12 @@ fn response_in(row: &Row) -> Result<Response, String> {
         state: numbers("state_bytes")?,
         settled_after,
         error,
+        iterates: match row.get::<_, Option<Vec<u8>>>("iterate_bytes") {
+            Err(rusqlite::Error::InvalidColumnName(_)) => Vec::new(),
+            other => {
+                let bytes = other.map_err(|e| e.to_string())?.unwrap_or_default();
+                unpack(&bytes).ok_or("iterate_bytes has a length that is not a multiple of 8")?
+            }
+        },
     })
 }

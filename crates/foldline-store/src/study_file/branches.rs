@@ -188,6 +188,7 @@ fn unit_of(quantity: Quantity, model: &Model) -> &str {
         Quantity::Parameter(k) => &model.parameters[k].unit,
         Quantity::Period => &model.time,
         Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => model.channel_unit(k),
+        Quantity::Iterate(k, _) => model.channel_unit(k),
         Quantity::Integral(_) | Quantity::Norm(_) => "",
     }
 }

@@ -58,6 +58,12 @@ pub(super) fn read(
     // Solutions of a forced model are cycles.
     let forced = ground.model.forced().then_some(Family::Cycle);
     let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
+    if let (true, Some(Kind::BranchPoint | Kind::Grazing), Some(value)) =
+        (ground.model.iterated(), hold, item.table.get("hold"))
+    {
+        let message = "curves of these points are not supported for maps";
+        walk.report(value.span(), message, "fold, period-doubling or torus");
+    }
     let first = base.as_ref().map(|base| &ground.model.parameters[base.plan.free]);
     let branch_range = branch_range(walk, item, base.as_ref(), first);
     let near = near(walk, item, branch_range, first);

@@ -10,6 +10,11 @@ pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
 
 /// Reads the cycle and represents it by polynomials of degree `degree`.
 pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize) -> Option<Cycle> {
+    if model.iterated() {
+        let hint = "give one iterate and their number, as in `state = { x = 0.5 }` with `periods = 3`";
+        walk.report(value.span(), "the model is a map, whose seeds are no cycles in time", hint);
+        return None;
+    }
     if model.forced() {
         let hint = "use `attractor = \"cycle\"` or `state = { … }`: a given cycle has no phase relative to the forcing";
         walk.report(value.span(), "the model is forced, and a seed cannot be a given `cycle`", hint);

@@ -6,8 +6,9 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::diagram::Shown;
-use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
+use foldline::explore::{AttractorKey, SeedPlan, SeedSource, iterates};
 use foldline::model::{Model, unsupported};
+use foldline::problem::map::cycle_of;
 use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
@@ -39,7 +40,7 @@ pub(super) fn read(
         if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {
             totals_of(walk, value, table.get("parameters"), model, state, &mut parameters);
         }
-        let source = lasting(walk, table, meant, model);
+        let source = lasting(walk, table, meant, model, &parameters);
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
@@ -80,9 +81,20 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, 
 }
 
 /// Applies `periods`, the number of forcing periods per cycle, if it is given.
-fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) -> SeedSource {
+fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model, parameters: &[f64]) -> SeedSource {
     let Some(value) = table.get("periods") else { return source };
     let periods = walk.integer(value, "`periods`", 1..=10_000);
+    if let (true, Some(periods), SeedSource::State(state)) = (model.iterated(), periods, &source) {
+        // The cycle to which Newton's method leads from the iterates of the state.
+        return match iterates(model, parameters, state, periods as usize) {
+            Some((all, gain)) => SeedSource::Cycle(cycle_of(&all, model.states.len(), &gain)),
+            None => {
+                let message = format!("the orbit of this state is not finite after {periods} iterations");
+                walk.report(value.span(), message, "give a state near the cycle, or fewer `periods`");
+                source
+            }
+        };
+    }
     if !model.forced() {
         let hint = "remove `periods`: the period of a cycle follows from the equations";
         walk.report(value.span(), "the model has no forcing, so no forcing periods", hint);
@@ -141,8 +153,16 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
     let text = walk.string(value, "`attractor`")?;
     let ratio = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     match (text.as_str(), ratio) {
+        ("fixed-point", _) if model.iterated() => Some(AttractorKey::Lasting(1)),
         ("equilibrium", _) => {
-            if model.forced() {
+            if model.iterated() {
+                let hint = "use `attractor = \"fixed-point\"`, or `\"cycle\"` for a cycle of any number of iterates";
+                walk.report(
+                    value.span(),
+                    "the model is a map and has fixed points and cycles, but no equilibria",
+                    hint,
+                );
+            } else if model.forced() {
                 let hint = "use `attractor = \"cycle\"`: the response to forcing is a cycle";
                 walk.report(value.span(), "the model is forced and has no equilibria", hint);
             }

@@ -109,6 +109,7 @@ pub fn record(folder: &Path) {
         state: vec![awkward(4), awkward(6)],
         settled_after: awkward(5),
         error: awkward(0),
+        iterates: Vec::new(),
     };
     let set = Responses { name: "down".into(), search: Search::Sweep, free: 2, responses: vec![response] };
     recorder.observe(Event::Responses(&set));

@@ -7,7 +7,7 @@
 use super::angles::{self, Rolled};
 use super::measure::response;
 use super::settling::{First, Settled, Trial, settle_together};
-use super::{Candidate, Sampling, driven};
+use super::{Candidate, Sampling, driven, iterated};
 use crate::contract::Verdict;
 use crate::diagram::{Motion, Response, Share};
 use std::sync::Mutex;
@@ -39,10 +39,10 @@ pub fn survey_by_simulation(
     values: &[f64],
     report: Report,
 ) -> Vec<Response> {
-    if let Some(rolled) = Rolled::new(trial.field) {
+    if let Some(rolled) = Rolled::new(trial.field).filter(|_| !trial.field.iterated()) {
         return angles::survey_by_simulation(&rolled, trial, sampling, (parameters, free, values), report);
     }
-    if trial.field.forced() {
+    if trial.field.forced() && !trial.field.iterated() {
         let sampling = driven::with_clock(sampling, 1.0);
         return driven::simulate(trial, report, |trial, report| {
             survey_by_simulation(trial, &sampling, parameters, free, values, report)
@@ -58,6 +58,19 @@ pub fn survey_by_simulation(
             let Some(&value) = values.get(index) else { return };
             let mut own = parameters.to_vec();
             own[free] = value;
+            let of = sampling.uniform();
+            let share = |number: usize| (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of });
+            if trial.field.iterated() {
+                let found = iterated::settled(trial, &own, &starts, free).into_iter().enumerate();
+                let found = grouped(trial, found.map(|(k, own)| Response { share: share(k), ..own }).collect());
+                if report(&found) == Verdict::Stop {
+                    stop.store(true, Ordering::Relaxed);
+                }
+                if let Ok(mut done) = done.lock() {
+                    done.push((index, found));
+                }
+                continue;
+            }
             let settled: Vec<Settled> = starts
                 .chunks((BLOCK * n).max(1))
                 .take_while(|_| !trial.field.ended())
@@ -65,9 +78,8 @@ pub fn survey_by_simulation(
                     settle_together(trial, &own.repeat(block.len() / n), block, First::Rough, trial.limits_at(&own))
                 })
                 .collect();
-            let of = sampling.uniform();
             let counted = |(number, settled): (usize, &Settled)| Response {
-                share: (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of }),
+                share: share(number),
                 ..response(trial, &own, free, settled).0
             };
             let found = grouped(trial, settled.iter().enumerate().map(counted).collect());
@@ -142,6 +154,9 @@ pub fn stepped_sweep(
     compare: Compare,
     report: Report,
 ) -> Vec<Response> {
+    if trial.field.iterated() {
+        return iterated::stepped_sweep(trial, parameters, free, values, start, compare, report);
+    }
     if let Some(rolled) = Rolled::new(trial.field) {
         return angles::stepped_sweep(&rolled, trial, (parameters, free, values), start, compare, report);
     }

@@ -41,6 +41,7 @@ pub(super) fn response(
         state: settled.state.clone(),
         settled_after: settled.time,
         error: settled.error,
+        iterates: Vec::new(),
     };
     let candidate = match settled.motion {
         Motion::Escaped => None,

@@ -15,7 +15,7 @@
 //! 7. merge solutions found in several blocks into one attractor, named by its spectral ratio (`census`, `spectrum`);
 //!    if only certain types are requested, stop once they have been found.
 //!
-//! A forced field is sampled as autonomous with two more states (`driven`), an angle as a point on a circle (`angles`).
+//! Maps are iterated (`iterated`). A forced field is sampled as autonomous with two more states (`driven`), an angle as a point on a circle (`angles`).
 //!
 //! A second set of modules simulates without solving any equation for the motions it finds (`brute_force`, `settling`,
 //! `runner`, `measure`), for comparison with branches.
@@ -28,6 +28,7 @@ mod brute_force;
 mod candidate;
 mod census;
 mod driven;
+mod iterated;
 mod measure;
 mod orbit;
 mod returns;
@@ -174,6 +175,10 @@ fn survey_at(
     polish: Polish,
     until: (Pace, Enough),
 ) -> Census {
+    if field.iterated() {
+        let brief = until.0.block == Pace::BRIEF.block;
+        return iterated::survey(field, parameters, sampling, polish, brief, until.1);
+    }
     if let Some(rolled) = Rolled::new(field) {
         return angles::survey(&rolled, parameters, sampling, polish, until);
     }
@@ -192,6 +197,9 @@ pub fn settle(
     start: &[f64],
     polish: Polish,
 ) -> Result<Point, Lost> {
+    if field.iterated() {
+        return iterated::settle(field, parameters, sampling, start, polish);
+    }
     if let Some(rolled) = Rolled::new(field) {
         return angles::settle(&rolled, parameters, sampling, start, polish);
     }

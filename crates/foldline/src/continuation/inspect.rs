@@ -577,7 +577,7 @@ impl Follow<'_> {
     /// touches 1 where the branch turns into its own mirror image; on the other branch it grows again.
     pub(super) fn may_jump(&self, [left, right]: [&Station; 2], history: Option<&History>, length: f64) -> bool {
         let (Some(history), true) = (history, self.settings.stability) else { return false };
-        let above = |spectrum: &[Complex64]| above_critical(spectrum, !left.mesh.is_empty());
+        let above = |spectrum: &[Complex64]| above_critical(spectrum, is_cycle(left));
         let all = [&history.spectrum, &left.point.spectrum, &right.point.spectrum].map(|spectrum| above(spectrum));
         let [Some(before), Some(now), Some(then)] = all else { return false };
         now + WELL * length * (now - before) / history.distance < 0.0 && then > WELL * now
@@ -604,6 +604,11 @@ impl Follow<'_> {
     }
 }
 
+/// True if the spectrum consists of multipliers.
+fn is_cycle(station: &Station) -> bool {
+    station.point.solution.period().is_some()
+}
+
 /// Logarithm of the smallest real multiplier above 1 (the smallest real eigenvalue above 0).
 fn above_critical(spectrum: &[Complex64], cycle: bool) -> Option<f64> {
     /// Excludes the trivial multiplier, which is closer to 1.
@@ -618,7 +623,7 @@ fn above_critical(spectrum: &[Complex64], cycle: bool) -> Option<f64> {
 fn may_double(history: &History, left: &Station, right: &Station, length: f64) -> bool {
     const FAST: f64 = 1.5;
     const RING: f64 = 1.0;
-    if left.mesh.is_empty() {
+    if !is_cycle(left) {
         return false;
     }
     let spectra = [&history.spectrum, &left.point.spectrum, &right.point.spectrum];
@@ -639,7 +644,7 @@ fn from_negative_axis(spectrum: &[Complex64], ring: f64) -> Option<f64> {
 /// passed -1 and returned. Its angle is the square root of a smooth function, so that the ends say little about the
 /// middle.
 fn may_double_unseen(left: &Station, right: &Station, length: f64) -> bool {
-    !left.mesh.is_empty() && stays_near(&left.point.spectrum, &right.point.spectrum, length)
+    is_cycle(left) && stays_near(&left.point.spectrum, &right.point.spectrum, length)
 }
 
 fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {

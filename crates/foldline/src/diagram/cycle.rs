@@ -8,6 +8,8 @@ use crate::problem::gauss::Scheme;
 /// On interval j the polynomial is given by its values at the left end and at the m Gauss points, so the profile is
 /// laid out `[interval][node 0..=m][component]`; node 0 is the left end. The orbit closes: the right end of the last
 /// interval is the left end of the first, plus `gain` if angles turn.
+///
+/// A cycle of a map has degree 0: N equal intervals, on each of which the state is that of one iterate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cycle {
     /// T, in the time unit of the model.
@@ -94,6 +96,10 @@ impl Cycle {
     /// Returns the state `[n]` at the end of the period, from the last polynomial.
     pub(crate) fn end(&self) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
+        if self.degree == 0 {
+            self.state_into(Scheme::of(self.degree), 1.0, &mut x);
+            return x;
+        }
         self.state_within(Scheme::of(self.degree), self.intervals() - 1, 1.0, &mut x);
         x
     }
@@ -112,6 +118,10 @@ impl Cycle {
 
     /// Evaluates the state at time `t` in interval j.
     fn state_within(&self, scheme: &Scheme, j: usize, t: f64, x: &mut [f64]) {
+        if self.degree == 0 {
+            let n = x.len();
+            return x.copy_from_slice(&self.profile[j * n..(j + 1) * n]);
+        }
         let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
         let block = (self.degree + 1) * x.len();
         scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);

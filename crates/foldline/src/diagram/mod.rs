@@ -77,6 +77,11 @@ impl Solution {
         }
     }
 
+    /// True for a cycle of a map.
+    pub fn is_of_map(&self) -> bool {
+        matches!(self, Solution::Cycle(cycle) if cycle.degree == 0)
+    }
+
     /// Mesh of a cycle; empty for an equilibrium.
     pub fn mesh(&self) -> Mesh {
         match self {
@@ -511,7 +516,9 @@ impl SpecialPoint {
             (Kind::BranchPoint, 3) => 2,
             _ => return None,
         };
-        self.certain(decides).map(|value| value < 0.0)
+        // At -1 the normal form of a map is -ξ + c ξ³.
+        let reversed = self.kind == Kind::PeriodDoubling && self.point.solution.is_of_map();
+        self.certain(decides).map(|value| (value < 0.0) != reversed)
     }
 
     /// `supercritical` or `subcritical` if that is known; `degenerate` if a required coefficient is zero within its

@@ -66,6 +66,9 @@ pub struct Response {
     /// For a cycle, its closing error relative to its extent. For an equilibrium, the remaining motion, but at least
     /// the tolerance of the integration, relative to scale plus size.
     pub error: f64,
+    /// For a map, iterates of the motion: those of one period, or some of a motion that is not periodic; `[count][states
+    /// and outputs]`. Empty otherwise, and in files of earlier versions.
+    pub iterates: Vec<f64>,
 }
 
 impl Response {

@@ -130,6 +130,10 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
         AttractorKey::Cycle => "no stable cycle".to_string(),
         AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
+        AttractorKey::Lasting(1) if system.field.iterated() => "no fixed point, stable or unstable,".to_string(),
+        AttractorKey::Lasting(count) if system.field.iterated() => {
+            format!("no cycle of {count} iterates, stable or unstable,")
+        }
         AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} forcing periods"),
     };
     let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;

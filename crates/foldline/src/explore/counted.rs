@@ -50,6 +50,10 @@ impl VectorField for Counted<'_> {
         self.field.ended()
     }
 
+    fn iterated(&self) -> bool {
+        self.field.iterated()
+    }
+
     fn forced(&self) -> bool {
         self.field.forced()
     }

@@ -5,6 +5,7 @@
 
 use super::scales_from;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
+use crate::diagram::Response;
 use crate::model::Model;
 use crate::simulation::{Clocked, Integrator, Outcome, Passage, Step, Tolerance};
 
@@ -42,6 +43,9 @@ pub fn course(
     parameters: &[f64],
     way: &Way,
 ) -> Course {
+    if model.iterated() {
+        return orbit(model, start, span, wanted, parameters, way);
+    }
     let unit = model.time_unit(parameters);
     let span = span.map(|t| t / unit);
     let scales = scales_from(model, start, parameters);
@@ -63,6 +67,53 @@ pub fn course(
     let outputs = outputs(model, &record.states, parameters, if model.forced() { &record.times } else { &[] });
     let times = record.times.iter().map(|t| t * unit).collect();
     Course { times, states: record.states, outputs, outcome: arrival.outcome }
+}
+
+/// Iterates of a map from `start`, as [`course`] records a trajectory: at every step, or at the wanted ones.
+fn orbit(
+    model: &Model,
+    start: &[f64],
+    span: [f64; 2],
+    wanted: Option<&[f64]>,
+    parameters: &[f64],
+    way: &Way,
+) -> Course {
+    let (mut times, mut states, mut outcome) = (Vec::new(), Vec::new(), Outcome::Reached);
+    let mut x = start.to_vec();
+    let last = span[1].max(0.0) as usize;
+    let mut wanted = wanted.map(|times| times.iter().map(|time| time.round() as usize).peekable());
+    for k in 0..=last {
+        let due = wanted.as_mut().is_none_or(|wanted| {
+            let mut due = false;
+            while wanted.next_if(|at| *at <= k).is_some() {
+                due = true;
+            }
+            due
+        });
+        if due {
+            times.push(k as f64);
+            states.extend_from_slice(&x);
+        }
+        let mut next = vec![0.0; x.len()];
+        let parameters = Parameters::Shared(parameters);
+        model.evaluate(Batch { lanes: 1, states: &x, parameters, times: &[], signs: &[] }, &mut next);
+        if k == last {
+            break;
+        }
+        outcome = match () {
+            () if (way.stop)() => Outcome::Stopped,
+            () if k >= way.steps => Outcome::StepLimit,
+            () if next.iter().any(|x| x.is_nan()) => Outcome::Undefined,
+            () if next.iter().any(|x| x.abs() > Response::UNBOUNDED) => Outcome::Escaped,
+            () => outcome,
+        };
+        if outcome != Outcome::Reached {
+            break;
+        }
+        x = next;
+    }
+    let outputs = outputs(model, &states, parameters, &[]);
+    Course { times, states, outputs, outcome }
 }
 
 /// Recorded part of a trajectory.

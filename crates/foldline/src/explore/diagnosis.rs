@@ -33,6 +33,9 @@ pub(super) struct Seen<'a> {
 /// Returns lines with a likely cause and a cure, to be appended to a message about what happened.
 pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> String {
     let stuck = seen.stuck;
+    if system.field.iterated() {
+        return of_map(system, &seen);
+    }
     if let Some(why) = of_laws(system, parameters) {
         return why;
     }
@@ -81,6 +84,22 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
             "\nwhat to do: use more samples, change the parameters or the ranges of the states, or give a state".into()
         }
     }
+}
+
+/// Cause and cure where orbits of a map led to no cycle.
+fn of_map(system: &System, seen: &Seen) -> String {
+    if let Some(why) = seen.exit.map(|exit| of_exit(system, exit)) {
+        return why;
+    }
+    if seen.all_escaped {
+        return "\nlikely cause: at these parameter values no attractor can be reached from the ranges of the states\n\
+                what to do: change the parameters or the ranges of the states, or give a state near the cycle"
+            .into();
+    }
+    "\nlikely cause: a quasi-periodic or chaotic motion, a cycle of more than 128 iterates, or slow attraction\nwhat to \
+     do: change the parameters, or state the number of iterates, as in `periods = 3`, for which unstable cycles are found \
+     by Newton's method as well"
+        .into()
 }
 
 /// Names of the states on which f depends with the period 2π, judged at a few points of the sampling box.

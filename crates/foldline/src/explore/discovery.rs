@@ -113,7 +113,7 @@ impl Discovery<'_, '_> {
     /// Carries out step 4.
     fn resonant(&mut self) -> bool {
         let (system, plan, tolerance) = (self.work.system, self.plan, self.work.plan.tolerance);
-        if system.whirl.is_none() && !system.field.forced() || self.exhausted() {
+        if system.whirl.is_none() && !system.field.forced() || system.field.iterated() || self.exhausted() {
             return true;
         }
         let resonances = Resonances { system, plan, tolerance };

@@ -19,6 +19,9 @@ use crate::problem::gauss::Scheme;
 ///
 /// `parameters` `[k]`. The numbers of states must agree.
 pub fn mismatch(field: &dyn VectorField, parameters: &[f64], solution: &Solution) -> Option<(usize, f64)> {
+    if field.iterated() {
+        return of_map(field, parameters, solution);
+    }
     let sizes = match solution {
         Solution::Equilibrium(state) => at_rest(field, parameters, state),
         Solution::Cycle(cycle) => along(field, parameters, cycle),
@@ -26,6 +29,32 @@ pub fn mismatch(field: &dyn VectorField, parameters: &[f64], solution: &Solution
     let share = |[off, size]: [f64; 2]| if off == 0.0 { 0.0 } else { off / size.max(f64::MIN_POSITIVE) };
     let shares = sizes.into_iter().map(share).enumerate();
     shares.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, share)| share.is_finite())
+}
+
+/// For a cycle of a map, the largest |f(x_k) - x_{k+1}| over the largest |x_k| of the component.
+fn of_map(field: &dyn VectorField, parameters: &[f64], solution: &Solution) -> Option<(usize, f64)> {
+    let Solution::Cycle(cycle) = solution else { return None };
+    let n = cycle.dim();
+    let mut worst = None;
+    for (k, state) in cycle.profile.chunks_exact(n.max(1)).enumerate() {
+        let mut f = vec![0.0; n];
+        let parameters = Parameters::Shared(parameters);
+        field.evaluate(Batch { lanes: 1, states: state, parameters, times: &[], signs: &[] }, &mut f);
+        for i in 0..n {
+            let next = (k + 1) * n + i;
+            let closed = cycle.profile[i] + cycle.gain.get(i).copied().unwrap_or(0.0);
+            let off = (f[i] - cycle.profile.get(next).copied().unwrap_or(closed)).abs();
+            let size = cycle.profile.iter().skip(i).step_by(n).fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+            let share = off / size;
+            if !share.is_finite() {
+                return None;
+            }
+            if worst.is_none_or(|(_, most)| share > most) {
+                worst = Some((i, share));
+            }
+        }
+    }
+    worst
 }
 
 fn at_rest(field: &dyn VectorField, parameters: &[f64], state: &[f64]) -> Vec<[f64; 2]> {

@@ -7,6 +7,7 @@ use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::problem::map::MapProblem;
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
@@ -52,6 +53,16 @@ impl Line {
             parameters: point.parameters.clone(),
             axes: both.into_iter().map(|index| self.axis(system, index)).collect(),
         };
+        if system.field.iterated() {
+            let condition = self
+                .held
+                .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
+            let surface = Box::new(MapProblem::like(setting, &point.solution));
+            return match condition {
+                Some(condition) => Box::new(Held::new(surface, condition)),
+                None => surface,
+            };
+        }
         if let (Some((Kind::BranchPoint, _)), Solution::Cycle(cycle), Some(unfolded)) =
             (self.held, &point.solution, system.unfolded)
         {
@@ -344,7 +355,7 @@ impl Growth<'_> {
             Some((Kind::Torus, _)) => Kind::Chenciner,
             _ => return true,
         };
-        let Some(start) = branch.points.first() else { return true };
+        let Some(start) = branch.points.first().filter(|_| !self.system.field.iterated()) else { return true };
         let own = setting(self.system, branch.free, &start.parameters);
         let count = special::cycle_form::switches_passed(&own, start);
         let note = format!(
@@ -480,7 +491,9 @@ impl Growth<'_> {
         };
         let mut marks: Vec<Box<dyn Monitor>> =
             self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
-        if !branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium)) {
+        let on_surfaces =
+            branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium));
+        if !on_surfaces && !system.field.iterated() {
             marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
             if branch.family == Family::Cycle {
                 marks.extend(sliding::monitors(system.field));
@@ -662,6 +675,20 @@ impl Growth<'_> {
                     special.error,
                     branch.earlier_there(special),
                 )
+            }
+            Solution::Cycle(there) if own.field.iterated() => {
+                let mut at = special.point.clone();
+                let before = if side == 1 { branch.points.last() } else { branch.points.first() };
+                if special.kind == Kind::BranchPoint
+                    && let Some(Solution::Cycle(cycle)) = before.map(|point| &point.solution)
+                    && cycle.profile.len() == there.profile.len()
+                {
+                    // As for equilibria.
+                    let change = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
+                    let gap = before.map(|point| change(point) / own.unit());
+                    at.tangent = there.profile.iter().zip(&cycle.profile).map(|(a, b)| a - b).chain(gap).collect();
+                }
+                special::map_form::coefficients(special.kind, &own, &at, special.error)
             }
             Solution::Cycle(_) => special::cycle_coefficients::coefficients(special.kind, &own, &special.point),
         }

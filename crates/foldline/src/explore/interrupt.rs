@@ -118,6 +118,10 @@ impl VectorField for Interruptible<'_> {
         self.observer.stopping()
     }
 
+    fn iterated(&self) -> bool {
+        self.field.iterated()
+    }
+
     fn forced(&self) -> bool {
         self.field.forced()
     }

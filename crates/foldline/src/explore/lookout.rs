@@ -3,6 +3,7 @@
 use super::System;
 use super::choice::summary;
 use super::growth::{polished, setting, settings};
+use super::maps;
 use super::plan::ExplorePlan;
 use super::seeds::{attractors, bare, sampling};
 use crate::diagram::{Point, Shown, Solution};
@@ -83,13 +84,27 @@ impl<'l> Lookout<'l> {
         };
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
-        let said = format!("at {}: {}; equilibria up to symmetry: {rests}", Shown(value), summary(system, &census));
+        let said = match system.field.iterated() {
+            true => format!(
+                "at {}: {}; cycles of up to {} iterates, stable or not: {}",
+                Shown(value),
+                summary(system, &census),
+                maps::SOUGHT,
+                found.len()
+            ),
+            false => format!("at {}: {}; equilibria up to symmetry: {rests}", Shown(value), summary(system, &census)),
+        };
         Sight { value, unsettled: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 
     /// Returns the equilibria in the ranges of the states, stable or not.
     fn rests(&self, parameters: &[f64], random: u64) -> Vec<Point> {
         let system = self.system;
+        if system.field.iterated() {
+            let samples = (self.plan.samples, random);
+            let of = |count| maps::cycles_of(system, parameters, samples, self.tolerance, count);
+            return (1..=maps::SOUGHT).flat_map(of).collect();
+        }
         if system.field.forced() {
             return Vec::new();
         }

@@ -23,6 +23,7 @@ use crate::continuation::Settings;
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::contract::Examination;
 use crate::diagram::{Cost, Cycle, Mesh, Point, Solution};
+use crate::problem::map;
 
 /// Numbers of turns that are tried; every other number up to 66 is a product of them. Empirical: sampling finds no
 /// cycle with more than 40 crossings of its section per period.
@@ -44,6 +45,9 @@ pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Op
 /// Returns one turn of a cycle that consists of a prime number of equal turns.
 fn reduced_once(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
+    if cycle.degree == 0 {
+        return of_map(system, settings, point, cycle);
+    }
     let of_angles = |turns: usize| turned_whole(system.field.periods(), &cycle.gain, turns);
     let whole = |turns: usize| {
         of_angles(turns) && (cycle.forcing_periods == 0 || (cycle.forcing_periods as usize).is_multiple_of(turns))
@@ -83,6 +87,29 @@ fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, 
     let same =
         same_period && found.difference(&expected, system.measure(), &[]) < 30.0 * settings.tolerance.max(allowed);
     same.then_some(Point { position: point.position, ..found })
+}
+
+/// Returns one turn of a cycle of a map that consists of equal turns.
+fn of_map(system: &System, settings: &Settings, point: &Point, cycle: &Cycle) -> Option<Point> {
+    let (n, count) = (cycle.dim().max(1), cycle.intervals());
+    let nearest = point.free_spectrum().iter().fold(1.0, |m: f64, z| m.min((z - 1.0).norm()));
+    let accuracy = settings.newton_tolerance();
+    let allowed = (10.0 * accuracy / nearest).min(accuracy.cbrt());
+    let size = |i: usize| cycle.profile.iter().skip(i).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()));
+    let sizes: Vec<f64> = (0..n).map(|i| system.scales[i] + size(i)).collect();
+    let part = (1..count).filter(|part| count.is_multiple_of(*part)).find(|part| {
+        let turns = count / part;
+        turned_whole(system.field.periods(), &cycle.gain, turns)
+            && (0..(count - part) * n).all(|c| {
+                let gained = cycle.gain.get(c % n).map_or(0.0, |gain| gain / turns as f64);
+                (cycle.profile[c] + gained - cycle.profile[c + part * n]).abs() <= allowed * sizes[c % n]
+            })
+    })?;
+    let gain: Vec<f64> = cycle.gain.iter().map(|gain| gain * part as f64 / count as f64).collect();
+    let once = Solution::Cycle(map::cycle_of(&cycle.profile[..part * n], n, &gain));
+    let guess = Point { solution: once, ..point.clone() };
+    let found = polished(&mut *problem_of(system, 0, 0, &guess, false), settings, &guess).ok()?.point;
+    Some(Point { position: point.position, ..found })
 }
 
 /// True if a share of the cycle is a whole number of turns of every angle.

@@ -11,7 +11,7 @@
 //! | how large are the states? | `sizes` |
 //! | how often is the vector field evaluated? | `counted` |
 //! | how is a run interrupted immediately? | `interrupt` |
-//! | where do first solutions come from? | [`seeds`] |
+//! | where do first solutions come from? | [`seeds`], those of maps `maps` |
 //! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
@@ -42,6 +42,7 @@ pub mod homotopy;
 mod interrupt;
 pub mod known;
 mod lookout;
+mod maps;
 mod minimal;
 pub mod persistence;
 pub mod plan;
@@ -62,6 +63,7 @@ mod tests;
 mod tests_identity;
 
 pub use given::mismatch;
+pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,

@@ -107,6 +107,7 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
 pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
     if let Solution::Cycle(cycle) = &mut point.solution
         && cycle.degree != degree
+        && cycle.degree > 0
     {
         let (old, new) = (Scheme::new(cycle.degree), Scheme::new(degree));
         let n = cycle.dim();

@@ -10,6 +10,7 @@ use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
+use super::maps;
 use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use super::profile::{Spread, first_profile, with_degree};
@@ -115,6 +116,27 @@ impl<'p> Seeds<'p> {
         }
     }
 
+    /// An unstable cycle of a map with the number of iterates that a seed asks for, if there is no stable one.
+    fn unstable(&self, seed: &SeedPlan, key: &AttractorKey) -> Option<Point> {
+        let AttractorKey::Lasting(count) = key else { return None };
+        if !self.system.field.iterated() {
+            return None;
+        }
+        let (samples, count) = ((seed.samples, seed.random), *count as usize);
+        let found = maps::cycles_of(self.system, &seed.parameters, samples, self.plan.tolerance, count);
+        let others = match found.len() {
+            0 => return None,
+            1 => String::new(),
+            more => format!("; of the {more} found, it is the least unstable one with the smallest first state"),
+        };
+        let said = format!(
+            "no stable cycle of {count} iterates was reached: starting from an unstable one that Newton's method \
+             found{others}"
+        );
+        self.observer.observe(Event::Note(&seed.name, &said));
+        found.into_iter().next()
+    }
+
     fn found(&self, index: usize) -> Result<Point, String> {
         let (system, plan, seed) = (self.system, self.plan, &self.plan.seeds[index]);
         if !self.needed[index] {
@@ -141,7 +163,8 @@ impl<'p> Seeds<'p> {
                 if let Some(said) = choice.told(system) {
                     self.observer.observe(Event::Note(&seed.name, &said));
                 }
-                choice.taken().cloned().ok_or_else(|| missing(system, seed, census, key))?
+                let found = choice.taken().cloned().or_else(|| self.unstable(seed, key));
+                found.ok_or_else(|| missing(system, seed, census, key))?
             }
         };
         Ok(with_degree(point, plan.degree))
@@ -183,6 +206,9 @@ fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
 /// Returns cause and cure, without sampling, if no equilibrium that a seed could mean is isolated. Cycles may be, if a
 /// symmetry only moves them along themselves.
 fn in_families(system: &System, seed: &SeedPlan) -> Option<String> {
+    if system.field.iterated() {
+        return None;
+    }
     let equilibrium = seed.source == SeedSource::Attractor(AttractorKey::Equilibrium);
     if equilibrium { of_laws(system, &seed.parameters) } else { None }
 }
@@ -196,7 +222,7 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
         SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
-    let newton = newton_from_rest(system, plan, seed);
+    let newton = if system.field.iterated() { None } else { newton_from_rest(system, plan, seed) };
     let wanted = |found: &(Attractor, bool)| keys.iter().all(|key| is_meant(key, &found.0.point, found.0.ratio));
     let meant = newton.filter(|found| !keys.is_empty() && wanted(found));
     if let Some((attractor, true)) = meant {
@@ -263,6 +289,9 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
 
 /// Solves for a candidate by Newton's method at fixed parameters; a cycle is reduced to its minimal period.
 pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
+    if system.field.iterated() {
+        return maps::polish(system, parameters, tolerance, candidate);
+    }
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
     let solved = |spread: Spread| {
@@ -330,6 +359,10 @@ fn from_state(
 ) -> Result<Point, String> {
     const NEXT: f64 = 1e-2;
     const NEAR: f64 = 0.3;
+    if system.field.iterated() {
+        let found = maps::from_state(system, seed, plan.tolerance, state);
+        return found.map_err(|lost| no_start(system, seed, state, &lost));
+    }
     let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = EquilibriumProblem::new(setting(system, 0, &seed.parameters));
     let given = bare(&seed.parameters, Solution::Equilibrium(state.to_vec()));

@@ -40,6 +40,8 @@ const STEADY: f64 = 2.0;
 const SLOW: f64 = 3.0;
 /// Initial value of a state that is 0, so that it can leave a saddle.
 const ASIDE: f64 = 1e-30;
+/// Initial value of such a state of a map, whose orbits may escape from far away states at once.
+const BESIDE: f64 = 1e-3;
 /// Magnitude below which a state counts as 0: ten decades above [`ASIDE`], for growth that decays again.
 const NOTHING: f64 = 1e-20;
 /// Relative change of the state over a step at which a trajectory is at rest.
@@ -128,6 +130,9 @@ fn rounded(size: f64) -> f64 {
 /// Returns the largest magnitude of every state `[n]` along the trajectory or, if started `aside`, at its end; `None`
 /// if it does not stay bounded. A state that grows from almost nothing and decays again says nothing about sizes.
 fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Option<Vec<f64>> {
+    if model.iterated() {
+        return of_orbit(model, start, parameters, aside);
+    }
     let (field, n) = (Clocked(model), model.dim());
     let slope = |x: &[f64]| {
         let mut f = vec![0.0; n + 1];
@@ -191,6 +196,23 @@ fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Opt
     // Anything smaller is below the accuracy.
     let lasts = |i: usize| here(i) > 10.0 * ACCURACY * sizes[i];
     Some((0..n).map(|i| if steady(i) && lasts(i) { here(i) } else { 0.0 }).collect())
+}
+
+/// Returns the largest magnitude of every state `[n]` along the orbit of a map from `start`, or from states `aside`.
+fn of_orbit(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Option<Vec<f64>> {
+    let mut x: Vec<f64> = start.iter().map(|x| if aside && *x == 0.0 { BESIDE } else { *x }).collect();
+    let mut sizes = vec![0.0f64; x.len()];
+    for _ in 0..STEPS {
+        sizes.iter_mut().zip(&x).for_each(|(size, x)| *size = size.max(x.abs()));
+        let mut next = vec![0.0; x.len()];
+        let parameters = Parameters::Shared(parameters);
+        model.evaluate(Batch { lanes: 1, states: &x, parameters, times: &[], signs: &[] }, &mut next);
+        if !next.iter().all(|x| x.abs() < INFINITE) {
+            return None;
+        }
+        x = next;
+    }
+    Some(sizes)
 }
 
 #[cfg(test)]

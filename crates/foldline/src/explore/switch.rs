@@ -11,8 +11,9 @@ use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
 use crate::problem::cycle::CycleProblem;
+use crate::problem::map::MapProblem;
 use crate::problem::{gauss::Scheme, mesh};
-use crate::special::{branch_point, hopf, period_doubling};
+use crate::special::{branch_point, hopf, map_form, period_doubling};
 
 /// Distances along the direction in the order of trial, in scaled variables. The shorter ones are for branches that
 /// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
@@ -154,8 +155,13 @@ fn doubled(
         let (mut problem, base, direction) =
             double(system, free, at, cycle).ok_or("no eigenvector of the multiplier -1 was found")?;
         let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
-        step_off(&mut problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
+        step_off(&mut *problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
     };
+    if cycle.degree == 0 {
+        let first = leave(cycle, &DISTANCES)?;
+        let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
+        return Ok(Beginning::Edge { before, first, joined: joined(at, free) });
+    }
     // The special point was located on a mesh twice as fine as that of other points. Every second node is enough for
     // the first point of the branch, unless none is found there or it has the wrong stability.
     let coarse = leave(&coarsened(cycle), &DISTANCES[..4]).ok().filter(|found| exchanges_stability(at, free, found));
@@ -174,15 +180,23 @@ fn coarsened(cycle: &Cycle) -> Cycle {
     Cycle { mesh, profile, ..cycle.clone() }
 }
 
+/// Problem, unknowns, and direction in which to leave.
+type Doubled<'a> = (Box<dyn ZeroProblem + 'a>, Vec<f64>, Vec<f64>);
+
 /// Returns the problem of doubled cycles at a period doubling, the cycle over two turns, and the direction to leave.
-fn double<'a>(
-    system: &'a System,
-    free: usize,
-    at: &SpecialPoint,
-    cycle: &Cycle,
-) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
-    let mut single = CycleProblem::like(setting(system, free, &at.point.parameters), cycle);
+fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Option<Doubled<'a>> {
     let with = |solution: Cycle| Point { solution: Solution::Cycle(solution), ..at.point.clone() };
+    if system.field.iterated() {
+        let own = setting(system, free, &at.point.parameters);
+        let vector = map_form::antiperiodic(&own, &at.point)?;
+        let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
+        direction.push(0.0);
+        let twice = Solution::Cycle(twice);
+        let mut problem = MapProblem::like(own, &twice);
+        let base = problem.unknowns_of(&Point { solution: twice, ..at.point.clone() });
+        return Some((Box::new(problem), base, direction));
+    }
+    let mut single = CycleProblem::like(setting(system, free, &at.point.parameters), cycle);
     let u = single.unknowns_of(&with(cycle.clone()));
     single.anchor(&u);
     let vector = single.antiperiodic_direction(&u)?;
@@ -190,7 +204,7 @@ fn double<'a>(
     direction.extend([0.0, 0.0]);
     let mut problem = CycleProblem::like(setting(system, free, &at.point.parameters), &twice).with_equal_halves();
     let base = problem.unknowns_of(&with(twice));
-    Some((problem, base, direction))
+    Some((Box::new(problem), base, direction))
 }
 
 /// Returns a period doubling as a point of the doubled branch that starts or ends there. Its stability is that of

@@ -122,7 +122,11 @@ impl<'a> System<'a> {
         let state = |k: usize| self.scales.get(k).copied().unwrap_or(1.0);
         match quantity {
             Quantity::Parameter(index) => self.unit(index),
-            Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => state(k),
+            Quantity::Iterate(k, _)
+            | Quantity::Smallest(k)
+            | Quantity::Largest(k)
+            | Quantity::Mean(k)
+            | Quantity::Rms(k) => state(k),
             Quantity::Norm(_) => self.scales.iter().fold(0.0, |most, scale| scale.max(most)),
             Quantity::Integral(_) => 1.0,
             Quantity::Period => 0.0,
@@ -228,7 +232,8 @@ impl<'a> System<'a> {
         let mut found = Vec::new();
         for bits in 1..1usize << n {
             let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let holds = [equivariant(&reflection, 0.0), forced && equivariant(&reflection, 0.5)];
+            let later = forced && !self.field.iterated();
+            let holds = [equivariant(&reflection, 0.0), later && equivariant(&reflection, 0.5)];
             if holds.contains(&true) {
                 found.push(reflection);
                 mirrors.push(holds);

@@ -7,6 +7,7 @@ pub mod block;
 pub mod chain;
 pub mod compound;
 pub mod condensed;
+pub mod cyclic;
 pub mod dense;
 pub mod lane;
 pub mod lu;

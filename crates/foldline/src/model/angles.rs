@@ -40,12 +40,31 @@ pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
             let time = [share(place, 2 * n)];
             let (here, there) = (f(&x, &parameters, &time), f(&moved, &parameters, &time));
             let size = here.iter().chain(&there).fold(0.0, |m: f64, v| m.max(v.abs()));
-            let other = |i: &usize| (here[*i] - there[*i]).abs() > SAME * size;
+            // The next value of an angle of a map moves with it.
+            let moves = |i: usize| if model.iterated() && i == c { period } else { 0.0 };
+            let other = |i: &usize| (here[*i] + moves(*i) - there[*i]).abs() > SAME * (size + period);
             if !size.is_finite() {
                 continue;
             }
             if let Some(i) = (0..n).find(other) {
                 let (name, of) = (&model.states[c].name, &model.states[i].name);
+                if model.iterated() {
+                    return Some(ModelError {
+                        item: Item::State(items.get(c).copied().unwrap_or(0)),
+                        field: Field::Period,
+                        name: name.clone(),
+                        span: None,
+                        message: format!(
+                            "`{name}` is declared as an angle of period {period}, but one period later in `{name}` the \
+                             next `{of}` is {} instead of {}",
+                            there[i],
+                            here[i] + moves(i)
+                        ),
+                        hint: "an angle must advance by its own period, as in theta + omega + g(theta) with a periodic g; \
+                               or remove `period`"
+                            .into(),
+                    });
+                }
                 return Some(ModelError {
                     item: Item::State(items.get(c).copied().unwrap_or(0)),
                     field: Field::Period,

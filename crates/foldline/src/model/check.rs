@@ -322,7 +322,10 @@ impl<'a> Check<'a> {
             }
         }
         for (i, name) in states.iter().enumerate().filter(|(i, _)| equation_of[*i].is_none()) {
-            let hint = format!("give its rate of change: the right-hand side of d{name}/dt");
+            let hint = match source.map {
+                true => format!("give its next value, `{name} = \"…\"` under [map]"),
+                false => format!("give its rate of change: the right-hand side of d{name}/dt"),
+            };
             self.report(Item::State(i), Field::Expression, format!("the state `{name}` has no equation"), hint);
         }
         equation_of

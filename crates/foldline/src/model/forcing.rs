@@ -13,7 +13,7 @@ pub fn unrepeated(
 ) -> Option<[String; 2]> {
     const PLACES: usize = 16;
     const SAME: f64 = 1e-8;
-    if !field.forced() {
+    if !field.forced() || field.iterated() {
         return None;
     }
     let (n, outputs) = (field.dim(), field.output_count());

@@ -33,6 +33,9 @@ const DENOMINATORS: i32 = 60;
 
 /// Laws (1) that hold for all parameters: coefficients `[n]` of each, sparse as far as echelon form allows.
 pub fn conserved(field: &dyn VectorField) -> Vec<Vec<f64>> {
+    if field.iterated() {
+        return Vec::new();
+    }
     laws(&Places { field, fixed: None })
 }
 
@@ -44,6 +47,9 @@ pub fn conserved_at(
     moving: &[(usize, [f64; 2])],
     ranges: &[[f64; 2]],
 ) -> Vec<Vec<f64>> {
+    if field.iterated() {
+        return Vec::new();
+    }
     laws(&Places { field, fixed: Some(Fixed { parameters, moving, ranges }) })
 }
 
@@ -69,7 +75,7 @@ pub(super) fn keeps_its_value(field: &dyn VectorField, c: &[f64]) -> bool {
 /// Shift symmetries (2): directions `[n]`.
 pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
     let n = field.dim();
-    if n > MOST {
+    if n > MOST || field.iterated() {
         return Vec::new();
     }
     let places = Places { field, fixed: None };

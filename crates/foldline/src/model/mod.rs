@@ -22,6 +22,7 @@ pub mod forcing;
 mod function;
 mod graph;
 mod identities;
+mod iterated;
 pub mod kernels;
 mod laws;
 mod lexer;
@@ -124,6 +125,8 @@ struct Inner {
     period: Option<Tape>,
     /// `[n]`, or empty if no state is an angle; see [`VectorField::periods`].
     periods: Vec<f64>,
+    /// True for a map.
+    map: bool,
     outputs: Tape,
     switches: Switches,
     /// f with given signs of the switches.
@@ -156,6 +159,11 @@ impl Deref for Model {
 impl Model {
     /// Compiles `source`, or returns all its errors.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
+        let refused = iterated::refused(&source);
+        if !refused.is_empty() {
+            return Err(refused);
+        }
+        let map = source.map;
         let (source, totals) = if source.totals.is_empty() { (source, Vec::new()) } else { totals::reduced(source)? };
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
@@ -180,6 +188,7 @@ impl Model {
             field,
             period,
             periods,
+            map,
             outputs,
             switches,
             given,
@@ -189,7 +198,8 @@ impl Model {
             switch_derivatives: RwLock::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
-        match model.wrong_period().or_else(|| angles::no_angle(&model, &items)) {
+        let wrong = model.wrong_period().or_else(|| iterated::switched(&model));
+        match wrong.or_else(|| angles::no_angle(&model, &items)) {
             Some(error) => Err(vec![error]),
             None => Ok(model),
         }
@@ -374,7 +384,11 @@ impl VectorField for Model {
     }
 
     fn forced(&self) -> bool {
-        self.inner.period.is_some()
+        self.inner.period.is_some() || self.inner.map
+    }
+
+    fn iterated(&self) -> bool {
+        self.inner.map
     }
 
     fn time_unit(&self, parameters: &[f64]) -> f64 {

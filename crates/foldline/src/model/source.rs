@@ -165,6 +165,8 @@ pub struct ModelSource {
     pub states: Vec<State>,
     /// One equation for each state, in any order.
     pub equations: Vec<Definition>,
+    /// True for a map: the equations give the next state instead of the rate.
+    pub map: bool,
     /// Entries of the matrix that multiplies the rates; rows without entries are those of the identity.
     pub mass: Vec<Mass>,
     /// Conserved sums of states.

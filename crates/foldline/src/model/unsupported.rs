@@ -18,9 +18,9 @@ type Kind = (&'static [&'static str], &'static str, &'static str);
 const KINDS: [Kind; 15] = [
     (
         &["map", "iterate", "iteration", "discrete", "discretetime"],
-        "maps are not supported: states obey differential equations",
-        "if the map samples a flow, give the flow, whose cycles are the fixed points; for other maps use MatContM or \
-         PyDSTool",
+        "a map is a model whose table [map] takes the place of [equations]",
+        "write `[map]` in the model file, with the next value of each state, as in `x = \"r*x*(1 - x)\"`; if the map \
+         samples a flow, give the flow, whose cycles are the fixed points",
     ),
     (
         &["reset", "jump", "event", "guard", "impact", "restitution", "hybrid", "transition"],

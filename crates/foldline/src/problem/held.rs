@@ -148,7 +148,7 @@ impl<'a> Held<'a> {
     /// Examination of the surface with the critical eigenvalues at their exact values; `u` includes the extra unknowns.
     fn with_held(&self, u: &[f64], mut found: Examination) -> Examination {
         // Critical eigenvalues count as neither stable nor unstable.
-        let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
+        let (first, is_cycle) = (found.trivial, self.surface.has_multipliers());
         let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
         let held = self.condition.held(&u[..self.extra()]);
         for z in &held {
@@ -299,6 +299,10 @@ impl ZeroProblem for Held<'_> {
 
     fn mesh(&self) -> Mesh {
         self.surface.mesh()
+    }
+
+    fn has_multipliers(&self) -> bool {
+        self.surface.has_multipliers()
     }
 
     fn set_mesh(&mut self, mesh: &Mesh) {

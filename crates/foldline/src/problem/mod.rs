@@ -1,9 +1,10 @@
-//! Equilibria and cycles as zero problems.
+//! Equilibria, cycles and cycles of maps as zero problems.
 //!
 //! | curve | unknowns u | file |
 //! |---|---|---|
 //! | equilibria | x, λ | [`equilibrium`] |
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
+//! | cycles of maps | all iterates, λ | [`map`] |
 //! | bifurcation points | those of either problem with two parameters, and extra ones of the condition | [`held`] |
 
 pub mod averages;
@@ -13,6 +14,7 @@ pub mod equilibrium;
 pub mod extremes;
 pub mod gauss;
 pub mod held;
+pub mod map;
 pub mod mesh;
 pub(crate) mod piecewise;
 pub mod setting;

@@ -2,7 +2,7 @@
 //!
 //! | on a curve of | kind | test function |
 //! |---|---|---|
-//! | folds | cusp | ⟨p, B(q, q)⟩; for cycles the slope in the first parameter, where it vanishes with that in the second |
+//! | folds | cusp | ⟨p, B(q, q)⟩, for maps as well; for cycles the slope in the first parameter, where it vanishes with that in the second |
 //! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩, unless they are pitchforks throughout |
 //! | folds, branch points of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
 //! | folds, branch points of equilibria | zero-Hopf | sums of two of the other eigenvalues |
@@ -23,7 +23,7 @@
 //! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
 use super::normal_form::Local;
-use super::{cycle_form, fold};
+use super::{cycle_form, fold, map_form};
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Ending, Family, Kind, Point};
 use crate::linalg::dot;
@@ -88,7 +88,11 @@ impl CodimensionTwo<'_> {
     /// Normal-form coefficient of the bifurcation of cycles that is continued.
     fn coefficient(&self, at: &Point) -> Option<f64> {
         let (field, scales, parameters) = (self.field, self.scales, at.parameters.clone());
-        cycle_form::coefficient(self.held, Setting { field, scales, parameters, axes: Vec::new() }, at)
+        let setting = Setting { field, scales, parameters, axes: Vec::new() };
+        if field.iterated() {
+            return map_form::coefficient(self.held, &setting, at);
+        }
+        cycle_form::coefficient(self.held, setting, at)
     }
 
     fn tested(&self, reference: &Point, at: &Point) -> Option<f64> {
@@ -97,6 +101,11 @@ impl CodimensionTwo<'_> {
         let product = |centre: f64| rest.iter().map(|z| (z - centre) / (1.0 + z.norm())).product::<Complex64>().re;
         let pairs = || (0..rest.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
         Some(match self.kind {
+            Kind::Cusp if self.field.iterated() => {
+                let parameters = at.parameters.clone();
+                let setting = Setting { field: self.field, scales: self.scales, parameters, axes: Vec::new() };
+                map_form::quadratic_near(&setting, reference, at)?
+            }
             Kind::Cusp if of_cycle => fold::first_slope(at),
             Kind::Cusp => {
                 // By symmetry the coefficient vanishes everywhere, up to rounding.
@@ -177,6 +186,11 @@ impl Monitor for CodimensionTwo<'_> {
 
     fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
         let of_cycle = at.solution.period().is_some();
+        if self.kind == Kind::Cusp && self.field.iterated() {
+            let parameters = at.parameters.clone();
+            let setting = Setting { field: self.field, scales: self.scales, parameters, axes: Vec::new() };
+            return map_form::is_simple(&setting, at);
+        }
         if self.kind == Kind::Cusp && of_cycle { fold::parameters_rest(ends, at) } else { self.confirms(at) }
     }
 

@@ -3,6 +3,7 @@
 use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
 use super::on_equilibria::OnEquilibria;
+use super::on_maps::OnMaps;
 use super::on_surfaces::OnSurfaces;
 use crate::contract::Condition;
 use crate::diagram::{Kind, Solution};
@@ -16,6 +17,9 @@ pub fn condition<'a>(
     degree: usize,
     at: &Solution,
 ) -> Option<Box<dyn Condition + 'a>> {
+    if setting.field.iterated() {
+        return Some(Box::new(OnMaps::new(kind, setting, at)?));
+    }
     match at {
         _ if matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium) => {
             let whole = match at {

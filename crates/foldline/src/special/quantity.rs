@@ -1,6 +1,6 @@
 //! Named scalar quantities of the points of a branch.
 
-use crate::diagram::Point;
+use crate::diagram::{Point, Solution};
 use crate::model::Model;
 
 /// Quantity of a point. States and outputs are numbered together, outputs after the states.
@@ -20,8 +20,20 @@ pub enum Quantity {
     Rms(usize),
     /// Integral over one period, ∫ g dt; undefined for equilibria.
     Integral(usize),
+    /// A state at one iterate of a cycle of a map: the state, and the number of the iterate from 0; for pictures.
+    Iterate(usize, usize),
     /// Root mean square of the state vector, ((1/T) ∫ Σ x_i² dt)^½, for the given number of states.
     Norm(usize),
+}
+
+/// State at an iterate of a cycle of a map.
+fn iterate(point: &Point, state: usize, number: usize) -> Option<f64> {
+    let Solution::Cycle(cycle) = &point.solution else { return None };
+    match cycle.degree {
+        0 if cycle.profile.is_empty() && cycle.forcing_periods == 1 => point.ranges.get(state).map(|range| range[0]),
+        0 => cycle.profile.get(number * cycle.dim() + state).copied(),
+        _ => None,
+    }
 }
 
 type Made = fn(usize) -> Quantity;
@@ -42,6 +54,7 @@ impl Quantity {
             Quantity::Period => point.solution.period(),
             Quantity::Smallest(k) => point.ranges.get(k).map(|range| range[0]),
             Quantity::Largest(k) => point.ranges.get(k).map(|range| range[1]),
+            Quantity::Iterate(k, number) => iterate(point, k, number),
             Quantity::Mean(k) => average(k, 0),
             Quantity::Rms(k) => average(k, 1).map(|square| square.max(0.0).sqrt()),
             Quantity::Integral(k) => average(k, 0).zip(point.solution.period()).map(|(mean, period)| mean * period),

@@ -2,6 +2,17 @@
 
 use crate::contract::Monitor;
 use crate::diagram::{Kind, Point};
+use num_complex::Complex64;
+
+/// Distance of a product of two multipliers from 1 that is rounding: those of an area-preserving map have the product 1
+/// all along a branch.
+const ROUNDING: f64 = 1e-13;
+
+/// (p - 1) / (1 + |p|), with one sign if p is 1 up to rounding.
+fn off(p: Complex64) -> Complex64 {
+    let off = (p - 1.0) / (1.0 + p.norm());
+    if off.norm() < ROUNDING { ROUNDING.into() } else { off }
+}
 
 /// Product of two multipliers equal to 1; real pairs (neutral saddles) are not confirmed.
 pub struct Torus;
@@ -14,7 +25,7 @@ impl Monitor for Torus {
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let z = at.free_spectrum();
         let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| (i, j)));
-        pairs.map(|(i, j)| z[i] * z[j]).map(|p| (p - 1.0) / (1.0 + p.norm())).product::<num_complex::Complex64>().re
+        pairs.map(|(i, j)| z[i] * z[j]).map(off).product::<Complex64>().re
     }
 
     fn confirms(&self, at: &Point) -> bool {

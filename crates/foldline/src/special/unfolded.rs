@@ -147,6 +147,10 @@ impl VectorField for Unfolded<'_> {
         self.field.ended()
     }
 
+    fn iterated(&self) -> bool {
+        self.field.iterated()
+    }
+
     fn forced(&self) -> bool {
         self.field.forced()
     }

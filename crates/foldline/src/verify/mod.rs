@@ -10,12 +10,14 @@
 //! |---|---|
 //! | nearest solution by shooting | `shooting`, `variational` |
 //! | single points | `points` |
+//! | cycles of maps, by the composed map | `maps` |
 //! | positions of special points | `special` |
 //! | changes of stability | `record` |
 //!
 //! **Fails when** the integration itself is not accurate enough: stiff equations, or a discontinuous right-hand side.
 //! Undecided cases are counted and reported as such, not as passed.
 
+mod maps;
 mod points;
 mod record;
 mod shooting;
@@ -176,7 +178,10 @@ pub fn verify(
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
         let setting = setting(system, branch);
-        out.add(points::verify(system, &setting, branch, &chosen, tolerance));
+        match system.field.iterated() {
+            true => out.add(maps::points(&setting, branch, &chosen)),
+            false => out.add(points::verify(system, &setting, branch, &chosen, tolerance)),
+        }
         out.add(special::verify(&setting, branch, tolerance));
         // Along a curve in two parameters stability also changes at codimension-two points that are not located.
         if branch.held.is_none() {

@@ -17,7 +17,7 @@
 //! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
-use super::{Check, Quantity, Undecided, Verified, accuracies};
+use super::{Check, Quantity, Undecided, Verified, accuracies, maps};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
@@ -171,6 +171,16 @@ impl Place<'_> {
         match &self.special.point.solution {
             Solution::Equilibrium(x) => Ok(self.equilibria(x, nodes)),
             Solution::Cycle(_) if self.special.point.is_light() => Err("its profile was not stored"),
+            Solution::Cycle(_) if self.setting.field.iterated() => {
+                if !maps::recomputes(self.special.kind) {
+                    return Err("points of this kind are not recomputed for maps");
+                }
+                let each = nodes.iter().map(|distance| {
+                    let (parameter, slope, spectrum) = maps::beside(self.setting, &self.special.point, *distance)?;
+                    Some(Nearby { parameter, slope, spectrum })
+                });
+                Ok(each.collect())
+            }
             Solution::Cycle(cycle) => {
                 let base = Orbit::of(self.setting, &self.special.point).ok_or("its profile was not stored")?;
                 let (n, tangent) = (base.dim(), &self.special.point.tangent);

@@ -203,7 +203,8 @@ fn equations(walk: &mut Walk, callables: &Callables, units: &Units) {
         let item = Item::Equation(i);
         let form = walk.form(item, Field::Expression, &own.expression, callables);
         let time = walk.names.time();
-        let rate = |walk: &Walk, name: &str| walk.names.of(name).plus(&time, -1.0);
+        let per = if source.map { 0.0 } else { -1.0 };
+        let rate = |walk: &Walk, name: &str| walk.names.of(name).plus(&time, per);
         let rows: Vec<_> = masses.iter().filter(|(_, mass, _)| mass.row == own.name).collect();
         for (mass, entry, k) in &rows {
             let goal = mass.plus(&rate(walk, &entry.column), 1.0);
