@@ -12,6 +12,7 @@ const KINDS = {
   "torus": ["star", "#56b4e9", "T"],
   "grazing": ["cross", "#7a5cc0", "G"],
   "boundary-equilibrium": ["plus", "#7a5cc0", "BE"],
+  sliding: ["cross", "#a0522d", "SL"],
   "mark": ["ring", "#808890", "M"],
   "unexplained": ["down", "#c00000", "?"],
   "cusp": ["down", "#cc79a7", "CP"],

@@ -59,6 +59,7 @@ fn parts(quantity: Quantity, model: &Model) -> (&str, &str, &'static str, &str) 
         Quantity::Mean(k) => ("mean", variable(k)),
         Quantity::Rms(k) => ("rms", variable(k)),
         Quantity::Integral(k) => ("integral", variable(k).map(|(name, _, text)| (name, "", text))),
+        Quantity::Iterate(k, _) => ("iterate", variable(k)),
     };
     let (name, unit, text) = found.unwrap_or_default();
     (name, unit, class, text)
