@@ -37,6 +37,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
     }
     let others = [
         "contact",
+        "friction",
         "endings",
         "exploring",
         "first-model",

@@ -150,7 +150,7 @@ fn a_branch_of_equilibria_ends_at_a_jump() {
 
 #[test]
 fn trajectories_that_slide_along_two_surfaces_are_explained() {
-    let states = [("x", "-2*sign(x) + mu*y"), ("y", "-2*sign(y) - x")];
+    let states = [("x", "-2*sign(x) + mu*y"), ("y", "-2*sign(y) - x - y")];
     Case { parameters: MU, states: &states, seed: "attractor = \"cycle\"", range: [0.0, 1.0], more: "" }.ends(&[
         "stopped because the step size became too small",
         "slide along two discontinuities at once",

@@ -109,8 +109,8 @@ fn a_block_sticks_to_its_belt() {
 #[test]
 fn a_branch_turns_back_where_sticking_ends() {
     let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n\
-        parameters = { p = 2.5 }\n\
-        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [2.4, 4]\n\
+        parameters = { p = 1.2 }\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [1.1, 4]\n\
         [[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\nparameters = { p = 4 }\n\
         [[branch]]\nname = \"e\"\nfrom = \"rest\"\nfree = \"p\"\nrange = [1.4, 4]\nswitch = { hopf = 1 }\n";
     let diagram = run(&belt(0.1), study);

@@ -110,12 +110,33 @@ fn a_discontinuous_field_is_integrated_to_rounding() {
 }
 
 #[test]
-fn sliding_along_a_switch_is_reported() {
-    let sliding = model(&[("x", "-sign(x)"), ("y", "1")]);
+fn a_trajectory_slides_along_a_surface_and_leaves_it() {
+    // It slides until y = 5, from where x' = (y - 5)/5 on the side x > 0. Backwards it leaves where it arrived.
+    let sliding = model(&[("x", "y/5 - sign(x)"), ("y", "1")]);
     let integrator = Integrator::new(&sliding, &[], Tolerance::uniform(1e-8, 2));
-    let arrival = integrator.trajectory(&[1.0, 0.0], [0.0, 10.0], &[], &mut |_| Verdict::Continue);
+    let mut slid = 0.0;
+    let arrival = integrator.trajectory(&[1.0, 0.0], [0.0, 10.0], &[], &mut |passage| {
+        if let Passage::Step(step) = passage
+            && step.start(0) == 0.0
+            && step.end(0) == 0.0
+        {
+            slid += step.end_time() - step.start_time();
+        }
+        Verdict::Continue
+    });
+    assert_eq!(arrival.outcome, Outcome::Reached);
+    assert!((arrival.state[0] - 2.5).abs() < 1e-9, "{:?}", arrival.state);
+    // x = 1 - t + t²/10 vanishes at 5 - √15.
+    assert!((slid - 15f64.sqrt()).abs() < 1e-9, "{slid}");
+}
+
+#[test]
+fn sliding_along_two_surfaces_is_reported() {
+    let sliding = model(&[("x", "-sign(x)"), ("y", "-sign(y)")]);
+    let integrator = Integrator::new(&sliding, &[], Tolerance::uniform(1e-8, 2));
+    let arrival = integrator.trajectory(&[1.0, 0.5], [0.0, 10.0], &[], &mut |_| Verdict::Continue);
     assert_eq!(arrival.outcome, Outcome::StepTooSmall);
-    assert!((arrival.time - 1.0).abs() < 1e-12);
+    assert!((arrival.time - 1.0).abs() < 1e-12, "{}", arrival.time);
 }
 
 #[test]
