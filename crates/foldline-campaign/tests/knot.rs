@@ -161,6 +161,7 @@ fn a_branch_started_within_a_cluster_of_special_points_closes() {
         marks: &[],
         collapses: &[],
         limit: &|_| None,
+        corner: &|_| None,
         holds: false,
         symmetric: false,
         direction: -1.0,

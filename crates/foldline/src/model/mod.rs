@@ -141,7 +141,7 @@ struct Inner {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Branch {
     /// The one in force at the state.
-    InForce,
+    Actual,
     /// That of given signs of the switches.
     Given,
     /// Motion along the surface of a switch, with given signs of the others.
@@ -283,7 +283,7 @@ impl Model {
     fn branch(&self, branch: Branch, direction: u32) -> (graph::Graph, Vec<graph::Id>) {
         let Compiled { graph, field, .. } = &self.inner.compiled;
         match branch {
-            Branch::InForce => (graph.clone(), field.clone()),
+            Branch::Actual => (graph.clone(), field.clone()),
             Branch::Given => self.inner.switches.given(direction),
             Branch::Sliding(switch) => self.inner.switches.sliding(direction, switch as usize),
         }
@@ -421,7 +421,7 @@ impl VectorField for Model {
 
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
         if at.signs.is_empty() {
-            return self.linear_tape(free, Branch::InForce).run(at, &[], &mut [f, fx, fp]);
+            return self.linear_tape(free, Branch::Actual).run(at, &[], &mut [f, fx, fp]);
         }
         if sliding::occurs(&at) {
             return sliding::each(at, &[], &mut [f, fx, fp], |at, _, along, to| match (along, to) {
@@ -434,7 +434,7 @@ impl VectorField for Model {
         let sizes = [f.len(), fx.len(), fp.len()];
         let actual = || {
             let [mut f, mut fx, mut fp] = sizes.map(|size| vec![0.0; size]);
-            self.linear_tape(free, Branch::InForce).run(at, &[], &mut [&mut f, &mut fx, &mut fp]);
+            self.linear_tape(free, Branch::Actual).run(at, &[], &mut [&mut f, &mut fx, &mut fp]);
             [f, fx, fp]
         };
         for (k, values) in [f, fx, fp].into_iter().enumerate() {
@@ -447,7 +447,7 @@ impl VectorField for Model {
         let with_parameters = directions.iter().any(|d| d[states..].iter().any(|&x| x != 0.0));
         let tape = |branch: Branch| self.directional_tape(directions.len(), with_parameters, branch);
         if at.signs.is_empty() {
-            return tape(Branch::InForce).run(at, directions, &mut [out]);
+            return tape(Branch::Actual).run(at, directions, &mut [out]);
         }
         if sliding::occurs(&at) {
             return sliding::each(at, directions, &mut [out], |at, directions, along, to| match along {
@@ -460,7 +460,7 @@ impl VectorField for Model {
         }
         let with_signs: Vec<&[f64]> = directions.iter().copied().chain([at.signs]).collect();
         tape(Branch::Given).run(at, &with_signs, &mut [out]);
-        complete(out, |to| tape(Branch::InForce).run(at, directions, &mut [to]));
+        complete(out, |to| tape(Branch::Actual).run(at, directions, &mut [to]));
     }
 
     fn output_count(&self) -> usize {

@@ -58,6 +58,9 @@ const SHORTEST: f64 = 1e-12;
 /// Jump of f, relative to the larger side, below which f is continuous: a switching is located to rounding, so that f
 /// on both sides of a kink differs by rounding times the ratio of the stiffnesses, up to 1e6.
 const CONTINUOUS: f64 = 1e-9;
+/// Function of the nodes of a part, its ends, and a place in it.
+type OnPart<'a> = dyn Fn(&[f64], [f64; 2], f64) -> f64 + 'a;
+
 /// Reason why an orbit cannot be computed on an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Obstacle {
@@ -304,7 +307,7 @@ impl<'a> PiecewiseFlow<'a> {
         at: f64,
         signs: &[f64],
         trial: &[f64],
-        value: &dyn Fn(&[f64], [f64; 2], f64) -> f64,
+        value: &OnPart,
     ) -> Option<(f64, Vec<f64>)> {
         let mut end = begin + at * (last - begin);
         let mut nodes = self.solved(x, [begin, end], signs, self.restricted(trial, [0.0, at]))?;

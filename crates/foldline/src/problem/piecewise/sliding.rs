@@ -41,7 +41,7 @@ impl PiecewiseFlow<'_> {
         if side < 0.0 { below[0] } else { -above[0] }
     }
 
-    /// Where a trial that slides along the surface of a switch leaves it: the place, and the side. `states` `[n ×
+    /// The place at which a trial that slides along the surface of a switch leaves it, and the side. `states` `[n ×
     /// places]` and `times` are those of the trial at the places.
     pub(super) fn leaving(
         &self,
