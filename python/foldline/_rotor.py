@@ -77,7 +77,9 @@ def _sections(name: str, parts: Sequence[Mapping[str, Any]]) -> str:
     lines = []
     for part in parts:
         if not isinstance(part, Mapping):
-            raise ArgumentError(f"{name} must be dictionaries, but got {part!r}\n  help: {name}=[dict(node=6, clearance=\"0.3 mm\", stiffness=5e6)]")
+            raise ArgumentError(
+                f'{name} must be dictionaries, but got {part!r}\n  help: {name}=[dict(node=6, clearance="0.3 mm", stiffness=5e6)]'
+            )
         lines.append(f"\n[[{name}]]")
         lines += [f"{key.replace('_', '-')} = {value(own)}" for key, own in part.items()]
     return "\n".join(lines) + "\n" if lines else ""
@@ -153,7 +155,9 @@ def rotor(
     ['u_0', "u_0'", 'v_0', "v_0'"]
     """
     if (own is None) == (M is None):
-        raise ArgumentError("a rotor needs another program's rotor, or matrices\n  help: foldline.rotor(ross_rotor), or foldline.rotor(M=M, K=K)")
+        raise ArgumentError(
+            "a rotor needs another program's rotor, or matrices\n  help: foldline.rotor(ross_rotor), or foldline.rotor(M=M, K=K)"
+        )
     if own is not None:
         matrices, found = _from_rotor(own)
         nodes = found if nodes is None else nodes
@@ -169,7 +173,7 @@ def rotor(
         raise ArgumentError(f"per_node must be 4 or 6, but got {per_node!r}\n  help: give lateral matrices, or all six degrees of freedom")
     if per_node == 6:
         matrices = _reduced(matrices, per_node)
-    lines = [f"name = {value(name)}", "", "[parameters]", f"Omega = {{ value = {value(speed)}, unit = \"rad/s\" }}"]
+    lines = [f"name = {value(name)}", "", "[parameters]", f'Omega = {{ value = {value(speed)}, unit = "rad/s" }}']
     lines += [f"{key} = {value(each)}" for key, each in (parameters or {}).items()]
     lines += ["", "[rotor]", 'speed = "Omega"']
     lines += [f"{key} = {value(each)}" for key, each in (("frame", frame), ("gravity", gravity)) if each is not None]
