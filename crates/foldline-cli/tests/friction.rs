@@ -108,11 +108,13 @@ fn a_block_sticks_to_its_belt() {
 /// branch, from either end.
 #[test]
 fn a_branch_turns_back_where_sticking_ends() {
-    let study = "tolerance = 1e-8\n[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\nparameters = { p = 4 }\n\
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n\
+        parameters = { p = 1.2 }\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [1.1, 4]\n\
+        [[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\nparameters = { p = 4 }\n\
         [[branch]]\nname = \"e\"\nfrom = \"rest\"\nfree = \"p\"\nrange = [1.4, 4]\nswitch = { hopf = 1 }\n";
     let diagram = run(&belt(0.1), study);
-    {
-        let name = "e/hopf-1";
+    for name in ["b", "e/hopf-1"] {
         let branch = diagram.branch(name).unwrap();
         let complete = |end: &Option<Ending>| end.as_ref().is_some_and(Ending::complete);
         assert!(branch.ends.iter().all(complete), "{name}: {:?}", branch.ends);

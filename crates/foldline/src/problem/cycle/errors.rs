@@ -333,9 +333,13 @@ impl CycleProblem<'_> {
             signs: &[],
         };
         self.setting.field.evaluate(batch, &mut f);
-        for found in self.switched(u).iter() {
-            let j = found.interval;
-            let batch = Batch { lanes: 1, states: &u[j * block..j * block + n], signs: found.signs_at_left(), ..batch };
+        let switched = self.switched(u);
+        let at_left = switched.iter().map(|found| (found.interval, found.signs_at_left()));
+        // A slide that reaches a node goes on there.
+        let slides = switched.iter().filter(|found| found.slides_at_right());
+        let at_right = slides.map(|found| ((found.interval + 1) % count, found.signs_at_right()));
+        for (j, signs) in at_left.chain(at_right) {
+            let batch = Batch { lanes: 1, states: &u[j * block..j * block + n], signs, ..batch };
             let mut own = vec![0.0; n];
             self.setting.field.evaluate(batch, &mut own);
             own.iter().enumerate().for_each(|(i, own)| f[i * count + j] = *own);

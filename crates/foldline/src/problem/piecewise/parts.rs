@@ -57,6 +57,16 @@ impl Switched {
         }
     }
 
+    /// Signs of the switches at the right end.
+    pub fn signs_at_right(&self) -> &[f64] {
+        &self.parts[self.parts.len() - 1].signs
+    }
+
+    /// True if the orbit slides at the right end.
+    pub fn slides_at_right(&self) -> bool {
+        self.signs_at_right().contains(&0.0)
+    }
+
     /// The part and the place in it of a place in the interval.
     fn part(&self, t: f64) -> (usize, f64) {
         let last = self.parts.len() - 1;
