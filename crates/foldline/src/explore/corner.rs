@@ -12,7 +12,7 @@
 //!   (2)  F_u(u_c + η τ) t = 0
 //! ```
 //!
-//! **Source.** dibernardo2008, §8.5 (grazing-sliding).
+//! **Source.** dibernardo2008, §8 (grazing-sliding).
 //!
 //! **Fails when** several surfaces are touched at once.
 
