@@ -74,12 +74,19 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
              cycle (docs/book/when-it-does-not-work.md)",
             angles.join(", ")
         ),
-        _ if seen.unsettled => format!(
-            "\nlikely cause: a quasi-periodic or chaotic motion, or slow attraction: trajectories are limited to \
+        _ if seen.unsettled => {
+            let rest = if system.field.switch_count() > 0 {
+                "rest on a surface at which f jumps (a sliding equilibrium, such as a mass that sticks, is not followed), "
+            } else {
+                ""
+            };
+            format!(
+                "\nlikely cause: a quasi-periodic or chaotic motion, {rest}or slow attraction: trajectories are limited to \
              {}\nwhat to do: raise the limit in the study, change the parameters or the ranges of the states, or \
              give a state",
-            limits(system)
-        ),
+                limits(system)
+            )
+        }
         _ => {
             "\nwhat to do: use more samples, change the parameters or the ranges of the states, or give a state".into()
         }

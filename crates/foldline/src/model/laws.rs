@@ -79,7 +79,7 @@ pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     let places = Places { field, fixed: None };
-    let rows: Vec<f64> = (0..MORE).filter_map(|k| places.jacobian(k)).flatten().collect();
+    let rows: Vec<f64> = (0..MORE).filter_map(|k| places.derivatives(k)).flatten().collect();
     let moves = |s: &Vec<f64>, fx: &[f64]| {
         fx.chunks_exact(n).all(|row| {
             let terms = row.iter().zip(s).map(|(a, b)| a * b);
@@ -87,7 +87,7 @@ pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
             terms.sum::<f64>().abs() <= LEFT[0] * size
         })
     };
-    let holds = |s: &Vec<f64>| (MORE..2 * MORE).filter_map(|k| places.jacobian(k)).all(|fx| moves(s, &fx));
+    let holds = |s: &Vec<f64>| (MORE..2 * MORE).filter_map(|k| places.derivatives(k)).all(|fx| moves(s, &fx));
     if rows.is_empty() { Vec::new() } else { null_space(rows, n).into_iter().filter(holds).collect() }
 }
 
@@ -162,6 +162,16 @@ impl Places<'_> {
         let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
         self.field.linearise(at, &[], &mut f, &mut fx, &mut []);
         fx.iter().all(|value| value.is_finite()).then_some(fx)
+    }
+
+    /// The Jacobian, then the gradients of the switches, which a shift must not change either: rows `[n]`.
+    fn derivatives(&self, k: usize) -> Option<Vec<f64>> {
+        let [x, parameters, times] = self.at(k);
+        let (n, count) = (x.len(), self.field.switch_count());
+        let [mut h, mut hx, mut ht] = [count, count * n, count].map(|size| vec![0.0; size]);
+        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
+        self.field.linearise_switches(at, &[], [&mut h, &mut hx, &mut [], &mut ht]);
+        hx.iter().all(|value| value.is_finite()).then(|| self.jacobian(k)).flatten().map(|fx| [fx, hx].concat())
     }
 
     /// True if c·f vanishes wherever f is defined, at points of every size and sign.
