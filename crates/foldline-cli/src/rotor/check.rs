@@ -1,4 +1,4 @@
-//! What `foldline check` says about a rotor.
+//! Report of `foldline check` on a rotor.
 
 use foldline_shaft::{Frame, Machine};
 

@@ -151,7 +151,7 @@ fn inside(system: &System, iterates: &[f64]) -> bool {
 /// of the state ends.
 ///
 /// # Errors
-/// What became of the orbit.
+/// Fate of an orbit under iteration.
 pub(super) fn from_state(
     system: &System,
     seed: &SeedPlan,
