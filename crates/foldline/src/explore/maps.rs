@@ -151,7 +151,7 @@ fn inside(system: &System, iterates: &[f64]) -> bool {
 /// of the state ends.
 ///
 /// # Errors
-/// Fate of an orbit under iteration.
+/// The way in which the orbit ended, if it reaches no solution.
 pub(super) fn from_state(
     system: &System,
     seed: &SeedPlan,
