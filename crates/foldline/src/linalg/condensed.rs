@@ -11,7 +11,8 @@
 //! ```text
 //!   (1)  A_j X_j + B_j x_j + C_j σ = r_j                     interior,   m·n rows per interval
 //!   (2)  x_{j+1} - e_0 x_j - Σ_k e_k X_{j,k} = c_j           continuity, n rows per interval
-//!   (3)  x_N = κ x_0                                         closure: κ = 1 periodic, κ = -1 antiperiodic
+//!   (3)  x_N = κ x_0                                         closure: κ = 1 periodic, κ = -1 antiperiodic, or
+//!                                                            conditions on both ends ([`Ends`])
 //!   (4)  Σ_j ⟨p_j, (x_j, X_j)⟩ + D σ = s                     border,     q rows
 //! ```
 //!
@@ -29,6 +30,7 @@
 use super::chain::{Chain, Links};
 use super::compound::Compound;
 use super::dense::MANY;
+use super::ends::Ends;
 use super::lane::{Eight, Lane, add, dot, intact, subtract};
 use super::shape::Shape;
 use super::{block, lu, tile};
@@ -76,6 +78,8 @@ pub struct Condensed<T> {
     products: Compound<T>,
     gentle: bool,
     whole: Chain<f64>,
+    /// Conditions that replace (3), if any.
+    open: Option<Ends>,
     last: Vec<f64>,
     last_pivots: Vec<usize>,
 }
@@ -282,6 +286,17 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Eliminate(self))
     }
 
+    /// Replaces (3) by conditions on both ends until the next call. The right-hand sides of a solution then contain those
+    /// of the conditions behind the others.
+    pub fn open(&mut self, ends: Option<Ends>) {
+        self.open = ends;
+    }
+
+    /// The conditions on both ends that replace (3), if any.
+    pub fn ends(&self) -> Option<&Ends> {
+        self.open.as_ref()
+    }
+
     /// Solves (1)–(4). `rhs` contains c_j (n) and r_j (m·n) for each interval, then s (q); the solution contains x_j
     /// and X_j for each interval, then σ.
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
@@ -357,7 +372,7 @@ impl<T: Lane> Condensed<T> {
 
     /// `[L][q × n]`: the border in terms of the interval ends alone.
     #[inline(always)]
-    fn ends(&self) -> &[T] {
+    fn border_at_ends(&self) -> &[T] {
         &self.condensed_border[..self.length * self.q * self.n]
     }
 
@@ -596,7 +611,7 @@ impl<T: Lane> Condensed<T> {
     fn reduced(&mut self, corner: &[f64], together: bool) -> Result<(), Singular> {
         let Condensed { n, q, closure, length, .. } = *self;
         let (width, full) = (n + q, 3 * n + q);
-        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, last, last_pivots, .. } = self;
+        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, open, own_units, .. } = self;
         let (step, condensed_border) = (&step[..length * n * width], &condensed_border[..length * q * n]);
         *gentle = together;
         if together {
@@ -616,6 +631,12 @@ impl<T: Lane> Condensed<T> {
         add(1.0, &beyond[..(T::COUNT - 1) * q * n], &mut border[q * n..]);
         whole.eliminate(Pieces { relation: &pieces.relation, n, q }, &border)?;
         add(1.0, &beyond[(T::COUNT - 1) * q * n..], &mut whole.last);
+        if let Some(ends) = open {
+            let sum = |k: usize| corner[k] + total(pieces.corner[k]) + whole.corner[k];
+            let corner: Vec<f64> = (0..q * q).map(sum).collect();
+            return ends.factorise(whole, &corner, own_units, [n, q]);
+        }
+        let Condensed { last, last_pivots, pieces, whole, .. } = self;
         for i in 0..n {
             let line = &whole.relation[i * full..(i + 1) * full];
             for c in 0..n {
@@ -637,6 +658,10 @@ impl<T: Lane> Condensed<T> {
 
     /// True if the last matrix is far from singular.
     fn is_settled(&self) -> bool {
+        // Conditions on the ends have units of their own, which pivots would have to be compared in.
+        if self.open.is_some() {
+            return true;
+        }
         let width = self.n + self.q;
         let pivots = self.last.iter().step_by(width + 1).take(width).map(|pivot| pivot.abs());
         let [least, most] = pivots.fold([f64::INFINITY, 0.0], |[least, most], x| [x.min(least), x.max(most)]);
@@ -760,7 +785,7 @@ impl<T: Lane> Solve<'_, T> {
         }
         match system.gentle {
             _ if idle => {}
-            true => system.products.forward(system.links(), system.ends(), h, taken, [n, q]),
+            true => system.products.forward(system.links(), system.border_at_ends(), h, taken, [n, q]),
             false => system.pieces.forward(h, taken, [n, q]),
         }
         let mut ends = unzipped(&h[(length - 1) * n..]);
@@ -771,11 +796,21 @@ impl<T: Lane> Solve<'_, T> {
         for c in 0..q {
             tail[n + c] += rhs[size + c] + total(taken[c]);
         }
-        tail[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
-        lu::solve(&system.last, width, &system.last_pivots, tail, 1);
-        let (first, sigma) = tail.split_at(n);
         let (beginning, closing) = nodes.split_at_mut(T::COUNT * n);
-        closing.iter_mut().zip(first).for_each(|(to, v)| *to = closure * v);
+        match &system.open {
+            None => {
+                tail[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
+                lu::solve(&system.last, width, &system.last_pivots, tail, 1);
+                closing.iter_mut().zip(&tail[..n]).for_each(|(to, v)| *to = closure * v);
+            }
+            Some(open) => {
+                let found = open.solve(&ends[(T::COUNT - 1) * n..], &tail[n..], &rhs[size + q..]);
+                tail[..n].copy_from_slice(&found[..n]);
+                tail[n..].copy_from_slice(&found[2 * n..]);
+                closing.copy_from_slice(&found[n..2 * n]);
+            }
+        }
+        let (first, sigma) = tail.split_at(n);
         system.whole.backward(&mut ends, first, closing, sigma, [n, q]);
         beginning[..n].copy_from_slice(first);
         beginning[n..].copy_from_slice(&ends[..(T::COUNT - 1) * n]);
@@ -853,15 +888,27 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         let mut closing = after[(T::COUNT - 1) * n..].to_vec();
         let (start, scalars) = tail.split_at_mut(n);
         system.whole.forward_transposed(&mut nodes, start, &mut closing, scalars);
-        add(closure, &closing, start);
-        lu::solve_transposed(&system.last, width, &system.last_pivots, &mut tail);
+        let mut conditions = Vec::new();
+        match &system.open {
+            None => {
+                add(closure, &closing, start);
+                lu::solve_transposed(&system.last, width, &system.last_pivots, &mut tail);
+            }
+            Some(open) => {
+                let right = [&*start, &closing, &*scalars].concat();
+                let [relation, border, own] = open.solve_transposed(right, [n, q]);
+                (tail, conditions) = ([relation, border].concat(), own);
+            }
+        }
         let (carry, border) = tail.split_at(n);
         system.whole.backward_transposed(&mut nodes, carry, border);
         let mut carry = vec![T::default(); n];
         zip(&nodes, &mut carry);
         let rows: Vec<T> = border.iter().map(|b| T::splat(*b)).collect();
         match system.gentle {
-            true => system.products.backward_transposed(system.links(), system.ends(), &mut ends, &carry, &rows),
+            true => {
+                system.products.backward_transposed(system.links(), system.border_at_ends(), &mut ends, &carry, &rows)
+            }
             false => system.pieces.backward_transposed(&mut ends, &carry, &rows),
         }
         for t in 0..length {
@@ -882,7 +929,8 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         }
         system.convert(&mut own, true);
         system.collect(&own, y, block);
-        y[size..].copy_from_slice(border);
+        y[size..size + q].copy_from_slice(border);
+        y[size + q..].copy_from_slice(&conditions);
     }
 }
 
@@ -1033,6 +1081,69 @@ mod tests {
             assert!(near(z[i], of_border[(i, 0)]), "{what}, border alone");
         }
         system.gentle
+    }
+
+    /// Compares solutions with conditions on both ends with dense ones: b conditions, and `live` of the q scalars in use.
+    fn agrees_open<T: Lane>(n: usize, intervals: usize, q: usize, [b, live]: [usize; 2], strength: f64) {
+        let mut s = empty::<T>(n, intervals, q);
+        let sizes: Vec<f64> = (0..n).map(|k| f64::from(1 << (2 * k))).collect();
+        s.measure_in(&sizes, &sizes);
+        let rhs = fill(&mut s, strength);
+        let (used, block) = (n + live - b, 3 * n);
+        let (size, whole) = (intervals * block, intervals * block + n + q);
+        let wave = |k: usize| (0.7 + (k * k) as f64 * 1.3).sin();
+        let rows: Vec<f64> = (0..b * (2 * n + q)).map(wave).collect();
+        // x_N follows the profile, then come the scalars; rows: x_N, then border rows and conditions.
+        let cycle = dense(&s, 0.0);
+        let place = |k: usize| if k < size { k } else { k + n };
+        let mut a = Mat::zeros(whole, whole);
+        for i in 0..size + used {
+            (0..size + q).for_each(|k| a[(i, place(k))] = cycle[(i, k)]);
+        }
+        for i in 0..n {
+            a[(size - block + i, size + i)] = 1.0;
+        }
+        for (r, row) in rows.chunks_exact(2 * n + q).enumerate() {
+            for (k, x) in row.iter().enumerate() {
+                a[(size + used + r, if k < n { k } else { size + k - n })] = *x;
+            }
+        }
+        (0..q - live).for_each(|k| a[(size + used + b + k, size + n + live + k)] = 1.0);
+        let c: Vec<f64> = (0..b).map(|k| wave(k + 7)).collect();
+        let right = |i: usize| match i {
+            _ if i < size + used => rhs[i],
+            _ if i < size + used + b => c[i - size - used],
+            _ => 0.0,
+        };
+        let reference = Factored::new(a.as_ref()).solve(&Mat::from_fn(whole, 1, |i, _| right(i)));
+        s.open(Some(Ends::new(rows, used, live)));
+        s.condense().unwrap();
+        s.eliminate(1.0).unwrap();
+        let mut x = vec![0.0; size + q];
+        s.solve(&[&rhs[..], &c].concat(), &mut x);
+        for (k, x) in x.iter().enumerate() {
+            let expected = reference[(place(k), 0)];
+            assert!((x - expected).abs() < 1e-8 * (1.0 + expected.abs()), "{k}: {x} against {expected}");
+        }
+        // Aᵀ y = z, which is tested by z·x = y·rhs.
+        let z: Vec<f64> = (0..size + q).map(|k| if k < size + live { wave(k + 3) } else { 0.0 }).collect();
+        let mut y = vec![0.0; size + q + b];
+        s.solve_transposed(&z, &mut y);
+        let known: Vec<f64> = (0..size + q).map(|k| if k < size + used { rhs[k] } else { 0.0 }).chain(c).collect();
+        let [one, other] = [[&z, &x], [&y, &known]].map(|[a, b]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>());
+        assert!((one - other).abs() < 1e-8 * (1.0 + one.abs()), "{one} against {other}");
+    }
+
+    #[test]
+    fn conditions_on_both_ends_agree_with_a_dense_solution() {
+        for strength in [3.0, 0.1] {
+            for (intervals, q, ends) in
+                [(1, 2, [3, 2]), (9, 2, [3, 2]), (17, 3, [1, 1]), (20, 3, [4, 3]), (40, 2, [3, 2])]
+            {
+                agrees_open::<f64>(3, intervals, q, ends, strength);
+                agrees_open::<Eight>(3, intervals, q, ends, strength);
+            }
+        }
     }
 
     #[test]

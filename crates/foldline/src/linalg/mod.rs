@@ -9,6 +9,7 @@ pub mod compound;
 pub mod condensed;
 pub mod cyclic;
 pub mod dense;
+pub mod ends;
 pub mod lane;
 pub mod lu;
 pub mod panel;

@@ -1,6 +1,7 @@
 //! The block system with the number of lanes that suits its size.
 
 use super::condensed::Condensed;
+use super::ends::Ends;
 use super::lane::Eight;
 use crate::contract::Singular;
 
@@ -88,6 +89,16 @@ impl System {
     /// [`Singular`] if the remaining matrix is.
     pub fn eliminate(&mut self, closure: f64) -> Result<(), Singular> {
         either!(self, s => s.eliminate(closure))
+    }
+
+    /// See [`Condensed::open`].
+    pub fn open(&mut self, ends: Option<Ends>) {
+        either!(self, s => s.open(ends));
+    }
+
+    /// See [`Condensed::ends`].
+    pub fn ends(&self) -> Option<&Ends> {
+        either!(self, s => s.ends())
     }
 
     /// See [`Condensed::solve`].
