@@ -19,8 +19,8 @@ const SCALE: f32 = 2.0;
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let mut run = read(&typed.folder, Part::Numbers)?;
-    if run.model.iterated() {
-        // Iterates are drawn, which are part of the profiles.
+    if run.model.iterated() || run.model.conditions() != [0, 0] {
+        // Iterates, or values at the ends of an interval, are drawn, which are part of the profiles.
         run = read(&typed.folder, Part::Everything)?;
     }
     let Run { mut model, mut diagram, .. } = run;

@@ -71,6 +71,11 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
         Quantity::Period => (("period", model.time.as_str()), ""),
         Quantity::Norm(_) => (("rms of the state", ""), ""),
         Quantity::Iterate(index, _) => (variable(index).unwrap_or_default(), ""),
+        Quantity::At(index, place) => {
+            let (name, unit) = variable(index).unwrap_or_default();
+            let unit = if matches!(unit, "" | "1" | "-") { String::new() } else { format!(" [{unit}]") };
+            return format!("{}({}){unit}", with_greek(name), f64::from_bits(place));
+        }
         Quantity::Smallest(index) => (variable(index).unwrap_or_default(), "min "),
         Quantity::Largest(index) => (variable(index).unwrap_or_default(), "max "),
         Quantity::Mean(index) => (variable(index).unwrap_or_default(), "mean "),

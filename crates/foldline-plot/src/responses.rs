@@ -27,6 +27,7 @@ pub fn value(quantity: Quantity, response: &Response) -> Option<f64> {
         Quantity::Period => response.period,
         Quantity::Smallest(k) => response.ranges.get(k).map(|range| range[0]),
         Quantity::Largest(k) => response.ranges.get(k).map(|range| range[1]),
+        Quantity::At(..) => None,
         Quantity::Iterate(k, number) => {
             let width = response.ranges.len();
             response.iterates.get(number * width + k).copied()

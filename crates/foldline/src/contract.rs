@@ -122,6 +122,26 @@ pub trait VectorField: Send + Sync {
     /// `ht` is `[switch_count × lanes]`, the derivative in τ. A field with switches must override it.
     fn linearise_switches(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) {}
 
+    /// Numbers of conditions at both ends and on integrals of a boundary-value problem, [0, 0] for any other field. The
+    /// interval is τ ∈ [0, 1], and [`VectorField::time_unit`] its length; [`VectorField::forced`] is true, but f need
+    /// not be periodic. There are as many conditions as states and [`VectorField::determined`] parameters.
+    fn conditions(&self) -> [usize; 2] {
+        [0, 0]
+    }
+
+    /// Parameters that the conditions of a boundary-value problem determine along with the solution.
+    fn determined(&self) -> &[usize] {
+        &[]
+    }
+
+    /// The conditions B(x(0), x(1), p) at the states `ends` `[n]` and their derivatives, into `[B, B_left, B_right,
+    /// B_p]`: `[b]`, `[b × n]` twice, and `[b × q]` with q = `free.len()`.
+    fn boundary(&self, _ends: [&[f64]; 2], _parameters: &[f64], _free: &[usize], _to: [&mut [f64]; 4]) {}
+
+    /// The integrands g, whose integrals over the interval vanish, and their derivatives, into `[g, g_x, g_p]`: `[i ×
+    /// lanes]`; `[i·n × lanes]` and `[i·q × lanes]`, ordered as by [`VectorField::linearise`].
+    fn integrands(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 3]) {}
+
     /// Rates of change of a switching function under the branches of f on its negative and on its positive side,
     /// ∇h·f + h_t: `[lanes]` each. `at.signs` selects the branch of the other switches.
     fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {

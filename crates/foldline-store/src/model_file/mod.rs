@@ -3,6 +3,7 @@
 //! **Idea.** The file is TOML; its expressions are compiled by [`foldline::model`]. A mistake inside an expression is
 //! reported with its line and column in the file. The format is described in docs/book/model-files.md.
 
+mod boundary;
 mod functions;
 mod items;
 mod mass;
@@ -21,7 +22,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 27] = [
+const ROOT_KEYS: [&str; 30] = [
     "name",
     "description",
     "source",
@@ -32,6 +33,9 @@ const ROOT_KEYS: [&str; 27] = [
     "tables",
     "parameters",
     "forcing",
+    "interval",
+    "boundary",
+    "integrals",
     "definitions",
     "states",
     "equations",
@@ -185,6 +189,9 @@ impl Reader<'_> {
             self.parameter(name, place, value, &mut source);
         }
         source.forcing = root.get("forcing").and_then(|value| self.forcing(value));
+        if let Some((boundary, length)) = self.boundary(root) {
+            (source.boundary, source.forcing) = (Some(boundary), length);
+        }
         for (name, place, value) in self.entries(root, "definitions") {
             self.definition(name, place, value, &mut source);
         }

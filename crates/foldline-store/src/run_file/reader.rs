@@ -270,6 +270,7 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
     let family = match row.get::<_, String>("family").map_err(|e| e.to_string())?.as_str() {
         "equilibrium" => Family::Equilibrium,
         "cycle" => Family::Cycle,
+        "arc" => Family::Arc,
         other => return Err(format!("unknown family \"{other}\"")),
     };
     let name: String = row.get("name").map_err(|e| e.to_string())?;

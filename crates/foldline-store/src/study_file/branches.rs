@@ -4,6 +4,7 @@ use super::items::{Ground, Item, Known, max_points, origin};
 use super::unknown_parameter;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
+use foldline::contract::VectorField;
 use foldline::diagram::{Kind, Shown};
 use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::{Model, Parameter, unsupported};
@@ -72,6 +73,10 @@ pub(super) fn free(walk: &mut Walk, item: &Item, model: &Model) -> Option<usize>
     let index = model.parameter_index(&name);
     if index.is_none() {
         unknown_parameter(walk, value.span(), &name, model);
+    }
+    if index.is_some_and(|index| model.determined().contains(&index)) {
+        let message = format!("`{name}` is determined by the conditions of the model");
+        walk.report(value.span(), message, "choose a parameter that is not listed under `solve` in the model");
     }
     index
 }
@@ -188,7 +193,7 @@ fn unit_of(quantity: Quantity, model: &Model) -> &str {
         Quantity::Parameter(k) => &model.parameters[k].unit,
         Quantity::Period => &model.time,
         Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => model.channel_unit(k),
-        Quantity::Iterate(k, _) => model.channel_unit(k),
+        Quantity::Iterate(k, _) | Quantity::At(k, _) => model.channel_unit(k),
         Quantity::Integral(_) | Quantity::Norm(_) => "",
     }
 }

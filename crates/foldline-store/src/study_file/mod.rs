@@ -21,6 +21,7 @@ use crate::model_file::{parse_model, parse_model_of_run, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
+use foldline::contract::VectorField;
 use foldline::explore::Plan;
 use foldline::model::{Model, conserved, in_words};
 use items::Items;
@@ -207,6 +208,7 @@ fn parse(
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
     }
+    no_motions(&mut walk, &root, &model);
     let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
@@ -242,6 +244,28 @@ fn parse(
         sweeps,
     };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
+}
+
+/// Reports what does not exist for a boundary-value problem: whatever needs motions from initial states, or curves in
+/// two parameters, which are not followed yet.
+fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
+    if model.conditions() == [0, 0] {
+        return;
+    }
+    for key in ["explore", "survey", "sweep", "curve"] {
+        let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
+        let (message, hint) = match key {
+            "curve" => (
+                "curves in two parameters are not followed for boundary-value problems",
+                "repeat the branch at several values of the second parameter",
+            ),
+            _ => (
+                "the model is a boundary-value problem: no motion starts from an initial state",
+                "give a first profile with `[[seed]]` and follow it with `[[branch]]`",
+            ),
+        };
+        walk.report(span, message, hint);
+    }
 }
 
 /// Reports a model file where a study was expected, with the commands that accept it.

@@ -1,10 +1,13 @@
-//! `cycle` of a seed: a cycle computed or measured elsewhere.
+//! `cycle` of a seed, a cycle computed or measured elsewhere, and `state` of a boundary-value problem, a first profile.
 
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
-use foldline::contract::VectorField;
+use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::diagram::Cycle;
-use foldline::model::Model;
+use foldline::model::{Definition, Item, Model, ModelError, ModelSource, Output, Parameter, State};
+use std::collections::HashMap;
+use std::ops::Range;
+use toml::de::DeTable;
 
 pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
 
@@ -122,4 +125,118 @@ fn list(walk: &mut Walk, value: &Value, what: &str, unit: &str) -> Option<Vec<f6
             None
         }
     }
+}
+
+/// Intervals of a first profile. Newton's method does not resolve much more before it converges on a better mesh.
+const INTERVALS: usize = 20;
+
+/// Reads the first profile of a boundary-value problem: a number, or an expression of the independent variable and the
+/// parameters, for each state.
+pub(super) fn arc(
+    walk: &mut Walk,
+    table: &DeTable,
+    span: &Range<usize>,
+    model: &Model,
+    degree: usize,
+    parameters: &[f64],
+) -> Option<Cycle> {
+    const HINT: &str = "give a number, or an expression of the independent variable, for each state: `state = { u = 0, \
+                        \"u'\" = \"sin(pi*t)\" }`";
+    for key in ["attractor", "cycle"] {
+        if let Some(value) = table.get(key) {
+            let message = format!("a boundary-value problem has no {key}; a seed gives a first profile");
+            walk.report(value.span(), message, HINT);
+            return None;
+        }
+    }
+    let Some(value) = table.get("state") else {
+        walk.report(span.clone(), "this seed gives no profile", HINT);
+        return None;
+    };
+    let names: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
+    let mut texts = vec!["0".to_string(); names.len()];
+    if value.get_ref().as_str() != Some("zero") {
+        let given = walk.table(value, "`state`")?;
+        let before = walk.found.len();
+        let mut missing: HashMap<&str, usize> = names.iter().enumerate().map(|(i, name)| (*name, i)).collect();
+        for (key, own) in given {
+            let name: &str = key.get_ref();
+            let Some(i) = missing.remove(name) else {
+                let message = format!("the model `{}` has no state `{name}`", model.name);
+                walk.report(key.span(), message, suggest(name, &names));
+                continue;
+            };
+            let what = format!("the state `{name}`");
+            texts[i] = match own.get_ref().as_str() {
+                Some(text) => text.to_string(),
+                None => walk.number(own, &what).map_or_else(|| "0".into(), |number| format!("{number:?}")),
+            };
+        }
+        let mut missing: Vec<&str> = missing.into_keys().collect();
+        missing.sort();
+        if !missing.is_empty() {
+            walk.report(value.span(), format!("the profile lacks {}", missing.join(", ")), HINT);
+        }
+        if walk.found.len() > before {
+            return None;
+        }
+    }
+    let length = model.time_unit(parameters);
+    let count = INTERVALS * degree + 1;
+    let times: Vec<f64> = (0..count).map(|k| k as f64 / (count - 1) as f64).collect();
+    let places: Vec<f64> = times.iter().map(|t| t * length).collect();
+    let states = match evaluated(model, &texts, parameters, &places) {
+        Ok(states) => states,
+        Err(errors) => {
+            errors.into_iter().for_each(|[message, hint]| walk.report(value.span(), message, hint));
+            return None;
+        }
+    };
+    if let Some(k) = states.iter().position(|x| !x.is_finite()) {
+        let message = format!("the state `{}` is not finite at {}", names[k % names.len()], places[k / names.len()]);
+        walk.report(value.span(), message, HINT);
+        return None;
+    }
+    let mut found = Cycle::given(length, &times, &states, degree, degree)?;
+    found.forcing_periods = 1;
+    Some(found)
+}
+
+/// Values `[count][n]` of expressions of the parameters and of the independent variable, at its values `places`.
+fn evaluated(
+    model: &Model,
+    texts: &[String],
+    parameters: &[f64],
+    places: &[f64],
+) -> Result<Vec<f64>, Vec<[String; 2]>> {
+    let variable = model.variable.as_str();
+    let named = model.parameters.iter().zip(parameters).map(|(own, value)| Parameter::new(&own.name, *value));
+    let outputs = texts.iter().enumerate().map(|(i, text)| Output::new(&format!("profile{}", i + 1), text));
+    let source = ModelSource {
+        name: "first profile".into(),
+        parameters: named.chain([Parameter::new(variable, 0.0)]).collect(),
+        states: vec![State::new("profile")],
+        equations: vec![Definition::new("profile", "0")],
+        outputs: outputs.collect(),
+        ..ModelSource::default()
+    };
+    let mistake = |error: ModelError| {
+        let state = match error.item {
+            Item::Output(i) => model.states.get(i).map_or("", |state| &state.name),
+            _ => "",
+        };
+        [format!("the profile of `{state}`: {}", error.message), error.hint]
+    };
+    let profile = Model::compile(source).map_err(|errors| errors.into_iter().map(mistake).collect::<Vec<_>>())?;
+    let (lanes, count) = (places.len(), parameters.len());
+    let mut values = vec![0.0; (count + 1) * lanes];
+    for (line, value) in values.chunks_exact_mut(lanes).zip(parameters) {
+        line.fill(*value);
+    }
+    values[count * lanes..].copy_from_slice(places);
+    let states = vec![0.0; lanes];
+    let batch = Batch { lanes, states: &states, parameters: Parameters::PerLane(&values), times: &[], signs: &[] };
+    let mut out = vec![0.0; texts.len() * lanes];
+    profile.outputs(batch, &mut out);
+    Ok((0..lanes * texts.len()).map(|k| out[k % texts.len() * lanes + k / texts.len()]).collect())
 }

@@ -1,6 +1,6 @@
 //! `[[seed]]`: first solutions.
 
-use super::profiles::cycle;
+use super::profiles::{arc, cycle};
 use super::{override_parameters, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
@@ -36,7 +36,7 @@ pub(super) fn read(
         if let Some(value) = table.get("parameters") {
             override_parameters(walk, value, model, &mut parameters);
         }
-        let meant = source(walk, table, &span, model, degree);
+        let meant = source(walk, table, &span, model, degree, &parameters);
         if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {
             totals_of(walk, value, table.get("parameters"), model, state, &mut parameters);
         }
@@ -49,7 +49,18 @@ pub(super) fn read(
     seeds
 }
 
-fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, degree: usize) -> SeedSource {
+fn source(
+    walk: &mut Walk,
+    table: &DeTable,
+    span: &Range<usize>,
+    model: &Model,
+    degree: usize,
+    parameters: &[f64],
+) -> SeedSource {
+    if model.conditions() != [0, 0] {
+        let found = arc(walk, table, span, model, degree, parameters).map(SeedSource::Cycle);
+        return found.unwrap_or(SeedSource::Attractor(AttractorKey::Equilibrium));
+    }
     let fallback = SeedSource::Attractor(AttractorKey::Equilibrium);
     let found = match (table.get("attractor"), table.get("state"), table.get("cycle")) {
         (Some(value), None, None) => attractor(walk, value, model).map(SeedSource::Attractor),
@@ -83,6 +94,10 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, 
 /// Applies `periods`, the number of forcing periods per cycle, if it is given.
 fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model, parameters: &[f64]) -> SeedSource {
     let Some(value) = table.get("periods") else { return source };
+    if model.conditions() != [0, 0] {
+        walk.report(value.span(), "a boundary-value problem has no periods", "remove `periods`");
+        return source;
+    }
     let periods = walk.integer(value, "`periods`", 1..=10_000);
     if let (true, Some(periods), SeedSource::State(state)) = (model.iterated(), periods, &source) {
         // The cycle to which Newton's method leads from the iterates of the state.

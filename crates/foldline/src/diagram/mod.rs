@@ -584,6 +584,8 @@ pub enum Family {
     Equilibrium,
     /// Cycles.
     Cycle,
+    /// Solutions of a boundary-value problem.
+    Arc,
 }
 
 impl Family {
@@ -592,6 +594,7 @@ impl Family {
         match self {
             Family::Equilibrium => "equilibrium",
             Family::Cycle => "cycle",
+            Family::Arc => "arc",
         }
     }
 }

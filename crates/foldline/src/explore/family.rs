@@ -7,7 +7,7 @@ use super::seeds::Seeds;
 use super::{System, arrival, crossings, curves, discovery, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
 use std::ops::Range;
 
 /// A root: something that starts at a seed, or finds its own starts.
@@ -231,8 +231,9 @@ impl Work<'_> {
             return Some((branch, going));
         }
         let family = match &start {
-            Ok(point) if matches!(point.solution, Solution::Equilibrium(_)) => Family::Equilibrium,
-            _ => Family::Cycle,
+            Ok(point) => self.system.family_of(&point.solution),
+            Err(_) if self.system.is_open() => Family::Arc,
+            Err(_) => Family::Cycle,
         };
         let mut branch = Branch::new(&plan.name, family, plan.free, origin);
         let begun = start.and_then(|point| {

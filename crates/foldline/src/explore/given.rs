@@ -227,3 +227,22 @@ mod tests {
         assert!(said.contains("no cycle was found near the given one") && said.contains("likely cause"), "{said}");
     }
 }
+
+/// The solution of a boundary-value problem to which Newton's method leads from a given profile, at the parameters of
+/// the seed.
+///
+/// # Errors
+/// The failure of Newton's method.
+pub(super) fn from_arc(system: &System, seed: &SeedPlan, tolerance: f64, guess: &Cycle) -> Result<Point, String> {
+    let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    // Any parameter serves that the conditions do not determine; beyond the last one, a dummy.
+    let free = (0..).find(|k| !system.field.determined().contains(k)).unwrap_or(0);
+    let given = bare(&seed.parameters, Solution::Cycle(guess.clone()));
+    let mut problem = problem_of(system, free, guess.degree, &given, false);
+    first(&mut *problem, &settings, &given).map(|found| found.point).map_err(|failure| {
+        format!(
+            "Newton's method does not lead from the given profile to a solution: {failure}; give a profile closer to \
+             one, or start at parameters at which a solution is known"
+        )
+    })
+}

@@ -46,7 +46,8 @@ impl Line {
 
     /// Returns the problem of this curve through `point`, on the mesh of the point.
     pub fn problem<'a>(&self, system: &'a System, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
-        let both: Vec<usize> = self.held.map(|(_, first)| first).into_iter().chain([self.free]).collect();
+        let determined = system.field.determined().iter().copied();
+        let both: Vec<usize> = determined.chain(self.held.map(|(_, first)| first)).chain([self.free]).collect();
         let setting = Setting {
             field: system.field,
             scales: &system.scales,
@@ -110,7 +111,7 @@ pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setti
         field: system.field,
         scales: &system.scales,
         parameters: parameters.to_vec(),
-        axes: vec![Axis::new(free, system.unit(free))],
+        axes: system.field.determined().iter().chain([&free]).map(|k| Axis::new(*k, system.unit(*k))).collect(),
     }
 }
 
@@ -690,6 +691,8 @@ impl Growth<'_> {
                 }
                 special::map_form::coefficients(special.kind, &own, &at, special.error)
             }
+            // Normal forms of boundary-value problems are not computed.
+            Solution::Cycle(_) if system.is_open() => Coefficients::default(),
             Solution::Cycle(_) => special::cycle_coefficients::coefficients(special.kind, &own, &special.point),
         }
     }

@@ -21,7 +21,7 @@ use super::plan::{HomotopyPlan, Plan};
 use super::{System, family};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
+use crate::diagram::{Branch, Diagram, Ending, Kind, Origin, Point, Shown, SpecialPoint};
 use crate::problem::Tie;
 
 /// Number of points along the family from which the direct run is tried.
@@ -372,10 +372,7 @@ impl Planner<'_> {
                 branch
             }
             None => {
-                let family = match start.solution {
-                    Solution::Equilibrium(_) => Family::Equilibrium,
-                    Solution::Cycle(_) => Family::Cycle,
-                };
+                let family = self.system.family_of(&start.solution);
                 let mut branch = Branch::new(&name, family, line.free, origin);
                 branch.held = line.held;
                 let begun =

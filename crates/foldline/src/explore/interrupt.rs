@@ -158,6 +158,22 @@ impl VectorField for Interruptible<'_> {
         self.field.switch_name(switch)
     }
 
+    fn conditions(&self) -> [usize; 2] {
+        self.field.conditions()
+    }
+
+    fn determined(&self) -> &[usize] {
+        self.field.determined()
+    }
+
+    fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64], free: &[usize], to: [&mut [f64]; 4]) {
+        self.field.boundary(ends, parameters, free, to);
+    }
+
+    fn integrands(&self, at: Batch, free: &[usize], to: [&mut [f64]; 3]) {
+        self.field.integrands(at, free, to);
+    }
+
     fn linearise_switches(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
         self.field.linearise_switches(at, free, to);
     }

@@ -14,7 +14,7 @@
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
+use crate::diagram::{Branch, Ending, Kind, Origin, Point};
 
 /// Fate of a solution.
 #[derive(Clone, Debug)]
@@ -58,10 +58,7 @@ pub fn persistence(
     let forward = value > own;
     let range = [own.min(value), own.max(value)];
     let settings = settings(system, tolerance, range, max_points);
-    let family = match point.solution {
-        Solution::Equilibrium(_) => Family::Equilibrium,
-        Solution::Cycle(_) => Family::Cycle,
-    };
+    let family = system.family_of(&point.solution);
     let mut problem = problem_of(system, free, degree, point, false);
     let start = match polished(&mut *problem, &settings, point) {
         Ok(start) => start,

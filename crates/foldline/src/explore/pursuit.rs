@@ -13,7 +13,7 @@ use super::growth::{Beginning, Growth, polished, problem_of, settings};
 use super::seeds::polish;
 use crate::attractors::Candidate;
 use crate::contract::Unobserved;
-use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
+use crate::diagram::{Branch, Ending, Kind, Origin, Point};
 
 /// Most points of a branch between two neighbouring values. A factor of safety: a step of a sweep takes a few points.
 const POINTS: usize = 300;
@@ -53,10 +53,7 @@ impl<'p> Pursuit<'p> {
         let mut problem = problem_of(self.system, self.free, self.degree, from, false);
         let station = polished(&mut *problem, &settings, from).ok()?;
         let (name, origin) = ("between two values", Origin::Seed(String::new()));
-        let family = match from.solution {
-            Solution::Equilibrium(_) => Family::Equilibrium,
-            Solution::Cycle(_) => Family::Cycle,
-        };
+        let family = self.system.family_of(&from.solution);
         let mut branch = Branch::new(name, family, self.free, origin);
         let growth = Growth {
             system: self.system,

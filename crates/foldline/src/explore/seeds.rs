@@ -8,7 +8,7 @@ use super::System;
 use super::choice::{Choice, is_meant, missing, summary};
 use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
-use super::given::from_cycle;
+use super::given::{from_arc, from_cycle};
 use super::growth::{polished, problem_of, setting, settings};
 use super::maps;
 use super::minimal::reduced;
@@ -145,6 +145,7 @@ impl<'p> Seeds<'p> {
         }
         system.repeats(&seed.parameters, &[])?;
         let point = match &seed.source {
+            SeedSource::Cycle(cycle) if system.is_open() => from_arc(system, seed, plan.tolerance, cycle)?,
             SeedSource::Cycle(cycle) => {
                 let point = from_cycle(system, seed, plan.tolerance, cycle)?;
                 self.tell_turns(&seed.name, cycle, &point);

@@ -40,7 +40,7 @@ pub fn beginning(
             born(system, settings, free, degree, at, pair).map(|b| (Family::Cycle, b))
         }
         (Kind::BranchPoint, solution) => {
-            let family = if matches!(solution, Solution::Cycle(_)) { Family::Cycle } else { Family::Equilibrium };
+            let family = system.family_of(solution);
             crossing(system, settings, free, degree, at).map(|b| (family, b))
         }
         _ => return None,

@@ -4,7 +4,7 @@ use super::plan::{ExplorePlan, Plan};
 use super::sizes;
 use crate::attractors::Limits;
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Diagram, Measure, Shown};
+use crate::diagram::{Diagram, Family, Measure, Shown, Solution};
 use crate::model::Model;
 use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
@@ -106,6 +106,20 @@ impl<'a> System<'a> {
         common
     }
 
+    /// True for a boundary-value problem.
+    pub fn is_open(&self) -> bool {
+        self.field.conditions() != [0, 0]
+    }
+
+    /// Type of the branches on which such solutions lie.
+    pub(super) fn family_of(&self, solution: &Solution) -> Family {
+        match solution {
+            Solution::Equilibrium(_) => Family::Equilibrium,
+            Solution::Cycle(_) if self.is_open() => Family::Arc,
+            Solution::Cycle(_) => Family::Cycle,
+        }
+    }
+
     /// Characteristic size of a parameter.
     pub fn unit(&self, index: usize) -> f64 {
         self.parameter_scales.get(index).copied().unwrap_or(1.0)
@@ -123,6 +137,7 @@ impl<'a> System<'a> {
         match quantity {
             Quantity::Parameter(index) => self.unit(index),
             Quantity::Iterate(k, _)
+            | Quantity::At(k, _)
             | Quantity::Smallest(k)
             | Quantity::Largest(k)
             | Quantity::Mean(k)
@@ -198,6 +213,35 @@ impl<'a> System<'a> {
         place.and_then(|place| self.mirrors.get(place)).is_some_and(|mirrors| mirrors[usize::from(half)])
     }
 
+    /// True if a reflection changes no more than the signs of the conditions of a boundary-value problem.
+    fn keeps_conditions(&self, reflection: &[bool], points: &[Vec<f64>], parameters: &[f64]) -> bool {
+        let ([ends, integrals], n) = (self.field.conditions(), self.field.dim());
+        let reflect =
+            |x: &[f64]| -> Vec<f64> { x.iter().zip(reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
+        let values = |left: &[f64], right: &[f64], time: f64| {
+            let [mut b, mut by_left, mut by_right] = [1, n, n].map(|size| vec![0.0; ends * size]);
+            self.field.boundary([left, right], parameters, &[], [&mut b, &mut by_left, &mut by_right, &mut []]);
+            let (mut g, mut gx) = (vec![0.0; integrals], vec![0.0; integrals * n]);
+            let (parameters, times) = (Parameters::Shared(parameters), &[time][..]);
+            let batch = Batch { lanes: 1, states: left, parameters, times, signs: &[] };
+            self.field.integrands(batch, &[], [&mut g, &mut gx, &mut []]);
+            b.extend(g);
+            b
+        };
+        let mut signs = vec![0.0; ends + integrals];
+        points.windows(2).enumerate().all(|(k, pair)| {
+            let time = 0.137 + 0.211 * k as f64;
+            let own = values(&pair[0], &pair[1], time);
+            let image = values(&reflect(&pair[0]), &reflect(&pair[1]), time);
+            own.iter().zip(&image).zip(&mut signs).all(|((a, b), sign)| {
+                let same = |sign: f64| (a - sign * b).abs() <= 1e-10 * (a.abs() + b.abs());
+                let fits = if *sign == 0.0 { [1.0, -1.0].into_iter().find(|s| same(*s)) } else { Some(*sign) };
+                *sign = fits.unwrap_or(0.0);
+                fits.is_some_and(same)
+            })
+        })
+    }
+
     /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter
     /// values `parameters`.
     pub fn find_reflections(&mut self, parameters: &[f64]) {
@@ -232,8 +276,11 @@ impl<'a> System<'a> {
         let mut found = Vec::new();
         for bits in 1..1usize << n {
             let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let later = forced && !self.field.iterated();
-            let holds = [equivariant(&reflection, 0.0), later && equivariant(&reflection, 0.5)];
+            let later = forced && !self.field.iterated() && !self.is_open();
+            let holds = [
+                equivariant(&reflection, 0.0) && self.keeps_conditions(&reflection, &points, parameters),
+                later && equivariant(&reflection, 0.5),
+            ];
             if holds.contains(&true) {
                 found.push(reflection);
                 mirrors.push(holds);

@@ -103,7 +103,7 @@ impl<'a> Check<'a> {
             self.symbols.insert(name, Symbol::Number(value));
         }
         if source.forcing.is_some() {
-            self.symbols.insert(TIME, Symbol::Time);
+            self.symbols.insert(source.boundary.as_ref().map_or(TIME, |own| own.variable.as_str()), Symbol::Time);
         }
         let parameters = source.parameters.iter().enumerate();
         let states = source.states.iter().enumerate();
@@ -364,6 +364,8 @@ pub(super) fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::Table(i) => &source.tables[i].name,
         Item::Mass(i) => &source.mass[i].row,
         Item::Total(i) => &source.totals[i].name,
-        Item::Whirl | Item::Forcing => "",
+        Item::Condition(i) => source.boundary.as_ref().map_or("", |own| &own.conditions[i].name),
+        Item::Integral(i) => source.boundary.as_ref().map_or("", |own| &own.integrals[i].name),
+        Item::Whirl | Item::Forcing | Item::Solve => "",
     }
 }

@@ -1,6 +1,7 @@
 //! Compilation of a model source to a graph: resolves names, expands repetition, orders definitions and reports every
 //! error.
 
+use super::boundary::{self, Conditions};
 use super::callable::Callables;
 use super::check::Check;
 use super::error::{Complaint, Field, Item, ModelError};
@@ -27,6 +28,8 @@ pub(super) struct Compiled {
     pub period: Option<Id>,
     /// One node per output.
     pub outputs: Vec<Id>,
+    /// Conditions at both ends of the interval, if there are any.
+    pub conditions: Conditions,
     /// States that form the complex signal.
     pub whirl: Option<[usize; 2]>,
 }
@@ -40,6 +43,7 @@ pub(super) struct Named {
 
 /// Parsed expressions of a source, in source order.
 struct Parsed {
+    ends: boundary::Parsed,
     functions: Vec<Option<Expression>>,
     definitions: Vec<Option<Expression>>,
     beyond: Vec<Option<Expression>>,
@@ -127,6 +131,7 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
             outputs.push(lowering.expression(item, Field::Expression, expression, own.as_slice()));
         }
     }
+    let conditions = parsed.ends.lowered(&mut lowering, &states);
     let Lowering { mut graph, period, found, .. } = lowering;
     for (item, field, complaint) in found {
         check.complain(item, field, complaint);
@@ -150,7 +155,7 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
         parameters: layout.expanded_parameters(&source.parameters),
         outputs: layout.expanded_outputs(&source.outputs),
     };
-    Ok((Compiled { period, graph, field, outputs, whirl }, named))
+    Ok((Compiled { period, graph, field, outputs, conditions, whirl }, named))
 }
 
 fn parse(check: &mut Check, layout: &Layout) -> Parsed {
@@ -204,7 +209,8 @@ fn parse(check: &mut Check, layout: &Layout) -> Parsed {
     if let Some(forcing) = &forcing {
         check.forcing(forcing, &definitions, &functions);
     }
-    Parsed { functions, definitions, beyond, equations, outputs, forcing, mass }
+    let ends = boundary::parse(check);
+    Parsed { ends, functions, definitions, beyond, equations, outputs, forcing, mass }
 }
 
 /// Solves the equations coupled by a mass matrix for the rates.

@@ -36,6 +36,12 @@ pub enum Item {
     Mass(usize),
     /// A conserved total.
     Total(usize),
+    /// A condition at the ends of the interval.
+    Condition(usize),
+    /// A condition on an integral over the interval.
+    Integral(usize),
+    /// The parameters determined by the conditions.
+    Solve,
 }
 
 /// Field of an item.
@@ -98,6 +104,9 @@ impl fmt::Display for ModelError {
             Item::Table(_) => "the table",
             Item::Mass(_) => "the mass of",
             Item::Total(_) => "the total",
+            Item::Condition(_) => "the boundary condition",
+            Item::Integral(_) => "the integral condition",
+            Item::Solve => "solve",
         };
         write!(f, "{part}")?;
         if !self.name.is_empty() {

@@ -19,8 +19,11 @@ pub fn unrepeated(
     let (n, outputs) = (field.dim(), field.output_count());
     let unit = field.time_unit(parameters);
     if !(unit > 0.0 && unit.is_finite()) {
-        let message = format!("the period of the forcing is {unit}");
-        return Some([message, "the period or frequency must be positive".into()]);
+        let [what, cure] = match field.conditions() {
+            [0, 0] => ["the period of the forcing", "the period or frequency must be positive"],
+            _ => ["the length of the interval", "the length must be positive"],
+        };
+        return Some([format!("{what} is {unit}"), cure.into()]);
     }
     let at = |time: f64, states: &[f64]| {
         let (mut f, mut g) = (vec![0.0; n], vec![0.0; outputs]);
@@ -31,6 +34,9 @@ pub fn unrepeated(
         f.iter_mut().for_each(|f| *f /= unit);
         [f, g].concat()
     };
+    if field.conditions() != [0, 0] {
+        return None;
+    }
     for place in 0..PLACES {
         let share = |k: usize| (0.5 + (k * PLACES + place) as f64 * 0.618_033_988_7).fract();
         let states: Vec<f64> =

@@ -34,7 +34,10 @@ pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint>
         } else if first.is_alphabetic() || first == '_' {
             let letters = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
             // A rate, such as x'.
-            let length = letters + rest[letters..].bytes().take_while(|b| *b == b'\'').count();
+            let primed = letters + rest[letters..].bytes().take_while(|b| *b == b'\'').count();
+            // A value at one end of the interval, such as x@1.
+            let at_end = ["@0", "@1"].into_iter().any(|end| rest[primed..].starts_with(end));
+            let length = if at_end { primed + 2 } else { primed };
             words.push((Token::Name(rest[..length].to_string()), at..at + length));
             at += length;
         } else if rest.starts_with("**") {
@@ -91,6 +94,7 @@ fn stray(found: char, at: usize) -> Complaint {
         '{' | '}' => "write round brackets ( ), or square ones for an index, as in `x[i+1]`",
         '&' | '|' => "combine conditions with `*` for and, `max(a, b)` for or",
         '\'' => "a rate is written `x'`, and `x'[i]` where x has an index",
+        '@' => "under [boundary], a state `x` is written `x@0` at the beginning of the interval and `x@1` at its end",
         '×' | '·' => "write `*` for a product",
         '−' | '–' => "write a plain minus sign `-`",
         _ => "an expression consists of numbers, names, + - * / ^ ( ) , and comparisons",

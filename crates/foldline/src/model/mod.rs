@@ -9,6 +9,7 @@
 //! are checked separately (`dimensions`). All errors come back as a list of [`ModelError`] with positions.
 
 mod angles;
+mod boundary;
 mod callable;
 mod check;
 mod compile;
@@ -52,7 +53,7 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State, Total,
+    Boundary, Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
@@ -111,6 +112,8 @@ pub struct About {
     pub whirl: Option<[usize; 2]>,
     /// Unit of time, and hence of periods; empty if not known.
     pub time: String,
+    /// Name of the time, or of the independent variable of a boundary-value problem.
+    pub variable: String,
     /// Remarks on doubtful units.
     pub remarks: Vec<String>,
 }
@@ -135,6 +138,7 @@ struct Inner {
     linear: Tapes<(Vec<usize>, Branch)>,
     directional: Tapes<(usize, bool, Branch)>,
     switch_derivatives: Tapes<Vec<usize>>,
+    condition_tapes: boundary::ConditionTapes,
 }
 
 /// Branch of f.
@@ -159,7 +163,7 @@ impl Deref for Model {
 impl Model {
     /// Compiles `source`, or returns all its errors.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
-        let refused = iterated::refused(&source);
+        let refused = [iterated::refused(&source), boundary::refused(&source)].concat();
         if !refused.is_empty() {
             return Err(refused);
         }
@@ -172,11 +176,23 @@ impl Model {
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
         let switches = Switches::new(&compiled.graph, &compiled.field);
         let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
+        let variable = source.boundary.as_ref().map_or(check::TIME.to_string(), |own| own.variable.clone());
         let ModelSource { name, description, source, time, .. } = source;
         let (whirl, remarks) = (compiled.whirl, Vec::new());
         let outputs_of = output_list;
-        let about =
-            About { name, description, source, states, parameters, totals, outputs: outputs_of, whirl, time, remarks };
+        let about = About {
+            name,
+            description,
+            source,
+            states,
+            parameters,
+            totals,
+            outputs: outputs_of,
+            whirl,
+            time,
+            variable,
+            remarks,
+        };
         let (given_graph, given) = switches.given(0);
         let given = Tape::new(&given_graph, &[&given]);
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
@@ -196,6 +212,7 @@ impl Model {
             linear: RwLock::default(),
             directional: RwLock::default(),
             switch_derivatives: RwLock::default(),
+            condition_tapes: Default::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         let wrong = model.wrong_period().or_else(|| iterated::switched(&model));
@@ -489,6 +506,24 @@ impl VectorField for Model {
         let parameters: Vec<&str> = self.parameters.iter().map(|own| own.name.as_str()).collect();
         let text = switches.get(switch).and_then(|id| show::text(graph, *id, &states, &parameters));
         text.unwrap_or_else(|| format!("switch {}", switch + 1))
+    }
+
+    fn conditions(&self) -> [usize; 2] {
+        let own = &self.inner.compiled.conditions;
+        [own.ends.len(), own.integrals.len()]
+    }
+
+    fn determined(&self) -> &[usize] {
+        &self.inner.compiled.conditions.solve
+    }
+
+    fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64], free: &[usize], to: [&mut [f64]; 4]) {
+        let parameters = Parameters::Shared(parameters);
+        self.at_ends(ends, Batch { lanes: 1, states: &[], parameters, times: &[], signs: &[] }, free, to);
+    }
+
+    fn integrands(&self, at: Batch, free: &[usize], to: [&mut [f64]; 3]) {
+        self.integrated(at, free, to);
     }
 
     fn linearise_switches(&self, at: Batch, free: &[usize], mut to: [&mut [f64]; 4]) {

@@ -138,6 +138,20 @@ pub struct Forcing {
     pub expression: String,
 }
 
+/// Conditions that make the model a boundary-value problem. Its interval is [0, L], with L the period under
+/// [`ModelSource::forcing`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Boundary {
+    /// Name of the independent variable.
+    pub variable: String,
+    /// Expressions that vanish, in terms of the states at both ends, `x@0` and `x@1`.
+    pub conditions: Vec<Definition>,
+    /// Expressions whose integrals over the interval vanish.
+    pub integrals: Vec<Definition>,
+    /// Parameters that are determined along with the solution: one for each condition beyond the number of states.
+    pub solve: Vec<String>,
+}
+
 /// Model as written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelSource {
@@ -165,6 +179,8 @@ pub struct ModelSource {
     pub states: Vec<State>,
     /// One equation for each state, in any order.
     pub equations: Vec<Definition>,
+    /// Conditions at the ends of an interval; `None` unless the model is a boundary-value problem.
+    pub boundary: Option<Boundary>,
     /// True for a map: the equations give the next state instead of the rate.
     pub map: bool,
     /// Entries of the matrix that multiplies the rates; rows without entries are those of the identity.

@@ -29,9 +29,10 @@ const KINDS: [Kind; 15] = [
          located exactly. For true resets use COCO or TC-HAT",
     ),
     (
-        &["boundary", "boundarie", "boundarycondition", "bc", "bvp"],
-        "boundary-value problems other than cycles are not supported",
-        "use AUTO-07p or COCO",
+        &["boundarie", "boundarycondition", "bc", "bvp", "nbc", "nint"],
+        "a boundary-value problem is a model with the tables [interval] and [boundary]",
+        "give `[interval]` with its `length`, and `[boundary]` with one condition for each state, such as `left = \
+         \"u@0\"`; integral conditions stand under [integrals]",
     ),
     (
         &["integralcondition", "integralconstraint", "constraint", "algebraic", "dae"],

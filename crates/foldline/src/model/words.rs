@@ -88,6 +88,13 @@ impl Check<'_> {
                  `period = \"…\"`"
                     .into()
             }
+            None if name.contains('@') && self.source.boundary.is_some() => {
+                "`@0` and `@1` follow the name of a state that is not repeated, and stand only under [boundary]".into()
+            }
+            None if name.contains('@') => {
+                "`@0` and `@1` belong to boundary-value problems: give [interval] with its `length`, and [boundary]"
+                    .into()
+            }
             None if name.ends_with("''") => {
                 "an acceleration cannot be used in an expression; name its right-hand side in the definitions".into()
             }

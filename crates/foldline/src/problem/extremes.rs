@@ -1,7 +1,8 @@
 //! Smallest and largest values of states and outputs.
 //!
 //! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a
-//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one.
+//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one. At the ends of an
+//! interval that is not periodic, the polynomials are continued a little, and only places inside count.
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
@@ -34,7 +35,8 @@ pub fn of_profile(
     forcing_periods: u32,
     scheme: &Scheme,
 ) -> Vec<[f64; 2]> {
-    let orbit = Orbit { field, parameters, profile, mesh, forcing_periods, scheme, count: mesh.len() - 1 };
+    let open = field.conditions() != [0, 0];
+    let orbit = Orbit { field, parameters, profile, mesh, forcing_periods, scheme, count: mesh.len() - 1, open };
     let channels = field.dim() + field.output_count();
     let lanes = orbit.lanes();
     let values = orbit.samples();
@@ -42,7 +44,7 @@ pub fn of_profile(
     let mut best = Vec::with_capacity(2 * channels);
     let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
     for line in values.chunks_exact(lanes) {
-        for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line)) {
+        for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line, open)) {
             peaks.extend(places.iter().map(|&place| Peak {
                 of: best.len(),
                 sign,
@@ -52,6 +54,12 @@ pub fn of_profile(
             }));
             best.push(top);
         }
+    }
+    if open {
+        let mut end = vec![0.0; field.dim()];
+        orbit.state_into(lanes as f64, &mut end);
+        let values = orbit.with_outputs(end, &orbit.times([lanes as f64].into_iter()));
+        best.iter_mut().enumerate().for_each(|(k, best)| *best = best.max(values[k / 2] * [-1.0, 1.0][k % 2]));
     }
     for _ in 0..ROUNDS {
         orbit.refine(&mut peaks, &mut best);
@@ -81,6 +89,8 @@ struct Orbit<'a> {
     scheme: &'a Scheme,
     /// N, the number of intervals.
     count: usize,
+    /// True for the solution of a boundary-value problem, whose end is not its beginning.
+    open: bool,
 }
 
 impl Orbit<'_> {
@@ -127,6 +137,12 @@ impl Orbit<'_> {
 
     /// Interval that contains a position in samples, and the position within it.
     fn interval(&self, place: f64) -> (usize, f64) {
+        if self.open {
+            // The first and the last polynomial extend beyond the ends.
+            let position = place / self.density() as f64;
+            let j = (position.max(0.0).floor() as usize).min(self.count - 1);
+            return (j, position - j as f64);
+        }
         let position = place.rem_euclid(self.lanes() as f64) / self.density() as f64;
         let j = (position.floor() as usize).min(self.count - 1);
         (j, position - j as f64)
@@ -167,7 +183,12 @@ impl Orbit<'_> {
             let at = (peak.of / 2) * probes + 3 * p;
             let [a, b, c] = [0, 1, 2].map(|k| peak.sign * values[at + k]);
             let best = &mut best[peak.of];
-            *best = best.max(a).max(b).max(c);
+            let inside = |place: f64| !self.open || (0.0..=self.lanes() as f64).contains(&place);
+            for (value, k) in [(a, -1.0), (b, 0.0), (c, 1.0)] {
+                if inside(peak.place + k * peak.spacing) {
+                    *best = best.max(value);
+                }
+            }
             let bend = a - 2.0 * b + c;
             let between = b >= a && b >= c;
             peak.reach = f64::INFINITY;
@@ -177,7 +198,7 @@ impl Orbit<'_> {
                     peak.reach = b - 0.125 * (c - a) * (c - a) / bend - bend;
                 }
                 peak.place += peak.spacing * shift.clamp(-1.0, 1.0);
-                if between && peak.spacing < 0.1 {
+                if between && peak.spacing < 0.1 && inside(peak.place) {
                     *best = best.max(b - 0.125 * (c - a) * (c - a) / bend);
                 }
             } else if a > b || c > b {
@@ -199,12 +220,12 @@ impl Orbit<'_> {
 }
 
 /// Largest value of sign · line for both signs, -1 first, and the samples of its best few peaks, best first.
-fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
+fn outermost(line: &[f64], open: bool) -> [(f64, Vec<usize>); 2] {
     let lanes = line.len();
     let mut found = [Summit::default(), Summit::default()];
     let mut look = |l: usize| {
-        let triple =
-            [line[if l > 0 { l - 1 } else { lanes - 1 }], line[l], line[if l + 1 < lanes { l + 1 } else { 0 }]];
+        let [first, last] = if open { [0, lanes - 1] } else { [lanes - 1, 0] };
+        let triple = [line[if l > 0 { l - 1 } else { first }], line[l], line[if l + 1 < lanes { l + 1 } else { last }]];
         // A sample between its neighbours is no peak, and one of them is more extreme for either sign.
         let [before, here, after] = triple;
         if (before < here && here < after) || (before > here && here > after) {

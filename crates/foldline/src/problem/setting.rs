@@ -132,18 +132,49 @@ impl Setting<'_> {
     /// The switches at one point and their derivatives with respect to the states, the unknowns λ and time: `h` and
     /// `ht` are `[switches]`, `hx` is `[switches × n]`, `hp` is `[switches × k]`.
     pub fn linearise_switches(&self, batch: Batch) -> [Vec<f64>; 4] {
-        let (count, n, k) = (self.field.switch_count(), self.field.dim(), self.axes.len());
+        let (count, n) = (self.field.switch_count(), self.field.dim());
         let (_, columns) = self.columns();
         let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
         let [mut h, mut hx, mut each, mut ht] = [1, n, free.len(), 1].map(|size| vec![0.0; count * size]);
         self.field.linearise_switches(batch, &free, [&mut h, &mut hx, &mut each, &mut ht]);
-        let mut hp = vec![0.0; count * k];
-        for s in 0..count {
+        [h, hx, self.gathered(&each, count, 1), ht]
+    }
+
+    /// The conditions at both ends of a boundary-value problem and their derivatives with respect to the states and the
+    /// unknowns λ; see [`VectorField::boundary`].
+    pub fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64]) -> [Vec<f64>; 4] {
+        let ([count, _], n) = (self.field.conditions(), self.field.dim());
+        let (_, columns) = self.columns();
+        let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
+        let [mut b, mut left, mut right, mut each] = [1, n, n, free.len()].map(|size| vec![0.0; count * size]);
+        self.field.boundary(ends, parameters, &free, [&mut b, &mut left, &mut right, &mut each]);
+        [b, left, right, self.gathered(&each, count, 1)]
+    }
+
+    /// The integrands of a boundary-value problem and their derivatives with respect to the states and the unknowns λ;
+    /// see [`VectorField::integrands`].
+    pub fn integrands(&self, batch: Batch) -> [Vec<f64>; 3] {
+        let ([_, count], n, lanes) = (self.field.conditions(), self.field.dim(), batch.lanes);
+        let (_, columns) = self.columns();
+        let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
+        let [mut g, mut gx, mut each] = [1, n, free.len()].map(|size| vec![0.0; count * size * lanes]);
+        self.field.integrands(batch, &free, [&mut g, &mut gx, &mut each]);
+        [g, gx, self.gathered(&each, count, lanes)]
+    }
+
+    /// Derivatives with respect to the unknowns λ, `[rows × k × lanes]`, from those with respect to the parameters that
+    /// move with them, `[rows × columns × lanes]`.
+    fn gathered(&self, each: &[f64], rows: usize, lanes: usize) -> Vec<f64> {
+        let (k, (_, columns)) = (self.axes.len(), self.columns());
+        let mut out = vec![0.0; rows * k * lanes];
+        for row in 0..rows {
             for (c, (axis, _, slope)) in columns.iter().enumerate() {
-                hp[s * k + axis] += slope * each[s * free.len() + c];
+                let from = &each[(row * columns.len() + c) * lanes..][..lanes];
+                let to = &mut out[(row * k + axis) * lanes..][..lanes];
+                to.iter_mut().zip(from).for_each(|(t, v)| *t += slope * v);
             }
         }
-        [h, hx, hp, ht]
+        out
     }
 
     /// f, f_x and the derivatives with respect to the unknowns: `fp` is `[n·k × lanes]`, entry (i, axis) at i·k + axis.
@@ -158,17 +189,10 @@ impl Setting<'_> {
             }
             return;
         }
-        let (n, k, q, lanes) = (self.field.dim(), self.axes.len(), columns.len(), batch.lanes);
+        let (n, q, lanes) = (self.field.dim(), columns.len(), batch.lanes);
         let mut each = vec![0.0; n * q * lanes];
         self.field.linearise(batch, &free, f, fx, &mut each);
-        fp.fill(0.0);
-        for (c, (axis, _, slope)) in columns.iter().enumerate() {
-            for i in 0..n {
-                let from = &each[(i * q + c) * lanes..(i * q + c + 1) * lanes];
-                let to = &mut fp[(i * k + axis) * lanes..(i * k + axis + 1) * lanes];
-                to.iter_mut().zip(from).for_each(|(t, v)| *t += slope * v);
-            }
-        }
+        fp.copy_from_slice(&self.gathered(&each, n, lanes));
     }
 
     /// Largest relative change of an unknown, with sizes below 1 taken as 1.

@@ -55,6 +55,7 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
             .into_iter()
             .chain([Box::new(period_doubling::PeriodDoubling) as Box<dyn Monitor>, Box::new(torus::Torus)])
             .collect(),
+        Family::Arc => both.into(),
     }
 }
 

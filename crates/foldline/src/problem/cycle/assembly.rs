@@ -76,8 +76,8 @@ impl CycleProblem<'_> {
         let (lanes, size) = (self.lanes(), self.profile_size());
         self.lay_phase();
         self.gather(u);
-        let parameters = self.setting.at(&u[size + 1..]);
-        let parameters = Parameters::Shared(&parameters);
+        let known = self.setting.at(&u[size + 1..]);
+        let parameters = Parameters::Shared(&known);
         let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
@@ -100,18 +100,21 @@ impl CycleProblem<'_> {
             phase: &self.phase,
             coupled: &self.coupled,
         };
+        let (q, first) = (self.system.shape().1, 1 + self.integrals());
         let (trace, corner) = either!(&mut self.system, s => (write(linear, s)?, &mut s.corner));
         self.trace = trace + switched.iter().map(Switched::trace).sum::<f64>();
-        let q = 1 + self.setting.freedom();
-        corner[..q].fill(0.0);
+        corner.fill(0.0);
         corner[0] = f64::from(u8::from(self.forcing_periods > 0));
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
-            let corner = &mut corner[(1 + r) * q..(2 + r) * q];
+            let corner = &mut corner[(first + r) * q..(first + 1 + r) * q];
             corner[0] = row[size] / (self.period_scale * self.period_scale);
-            corner[1..].copy_from_slice(&row[size + 1..]);
+            corner[1..row.len() - size].copy_from_slice(&row[size + 1..]);
         }
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
-            self.fill_row(1 + r, &row[..size]);
+            self.fill_row(first + r, &row[..size]);
+        }
+        if self.is_open() {
+            self.open_ends(u, &known);
         }
         for found in switched.iter() {
             let mut by = found.derivatives(&self.scheme, self.interval(found.interval));
@@ -227,8 +230,9 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
     fn call(self) -> Self::Output {
         // For common sizes the dimensions are constants, and every block is condensed while it is in the cache. This
         // compiles the whole factorisation once more, so it is not done for all sizes.
+        let plain = self.system.shape().1 == 1 + self.linear.free;
         match (self.linear.n, self.linear.scheme.degree, self.linear.free) {
-            (4, 4, 1) if T::COUNT > 1 => self.written::<true>(4, 4, 1),
+            (4, 4, 1) if T::COUNT > 1 && plain => self.written::<true>(4, 4, 1),
             (n, m, free) => self.written::<false>(n, m, free),
         }
     }
@@ -240,7 +244,8 @@ impl<T: Lane> Write<'_, '_, T> {
         let Write { linear, system } = self;
         let Linear { scheme, lengths, period, f, fx, fp, phase, coupled, .. } = linear;
         let (w, length) = (T::COUNT, system.length());
-        let (inner, width, block, lanes) = (m * n, n + 1 + free, (m + 1) * n, length * m * w);
+        let width = if CONDENSED { n + 1 + free } else { n + system.shape().1 };
+        let (inner, block, lanes) = (m * n, (m + 1) * n, length * m * w);
         let (one, zero) = (T::splat(1.0), T::default());
         let shares: Vec<T> = scheme.integration.iter().map(|a| T::splat(-a)).collect();
         let slots: Vec<usize> = (0..n).map(|c| system.slot(0, c)).collect();

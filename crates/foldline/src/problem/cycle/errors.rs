@@ -106,6 +106,10 @@ impl CycleProblem<'_> {
     /// Part of dλ/ds that may be rounding: [`STANDS`] if f_λ is as large as f, and inversely proportional to f_λ if it
     /// is smaller. If f does not depend on λ at all, the branch runs along λ.
     pub(super) fn slope_error(&self) -> f64 {
+        if self.is_open() {
+            // The parameter may enter through the conditions alone.
+            return STANDS;
+        }
         let (n, k) = (self.n, self.setting.freedom());
         let lanes = self.f.len() / n;
         let largest = |values: &[f64], row: usize, c: usize| {
@@ -302,7 +306,10 @@ impl CycleProblem<'_> {
             own[self.n..].copy_from_slice(source);
         }
         let mut shift = vec![0.0; u.len()];
-        self.system.solve(&rhs, &mut shift);
+        match self.is_open() {
+            true => self.solve_defects(&rhs, &mut shift),
+            false => self.system.solve(&rhs, &mut shift),
+        }
         let response = self.relative_size(&shift, u);
         let sizes: Vec<f64> = misses
             .chunks_exact(self.n)

@@ -57,7 +57,7 @@ impl CycleProblem<'_> {
         let (degree, target) = (self.scheme.degree, TARGET * tolerance);
         if self.halves {
             mesh::equidistributed_in_halves(errors, &self.mesh, degree, target, kept)
-        } else if self.nearly_doubled(u) {
+        } else if !self.is_open() && self.nearly_doubled(u) {
             let (errors, halved) = mesh::halved(errors, &self.mesh, degree);
             mesh::equidistributed_in_halves(&errors, &halved, degree, target, kept)
         } else {

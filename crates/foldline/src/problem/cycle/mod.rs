@@ -34,6 +34,7 @@
 mod assembly;
 mod errors;
 mod meshes;
+mod open;
 mod phase;
 mod residual;
 
@@ -80,6 +81,8 @@ pub struct CycleProblem<'a> {
     mesh: Mesh,
     n: usize,
     halves: bool,
+    /// Numbers of conditions on the ends and on integrals, for a boundary-value problem.
+    conditions: [usize; 2],
     /// q of (4); 0 for an autonomous field.
     forcing_periods: u32,
     /// `[n]`: x_N - x_0 where angles rotate; see [`Cycle::gain`].
@@ -124,8 +127,12 @@ impl<'a> CycleProblem<'a> {
     pub fn new(setting: Setting<'a>, degree: usize, mesh: &Mesh) -> CycleProblem<'a> {
         let scheme = Scheme::new(degree);
         let n = setting.field.dim();
+        let conditions = setting.field.conditions();
+        // Integral conditions in place of conditions on the ends need scalars that are not in use.
+        let unused = if conditions == [0, 0] { 0 } else { n.saturating_sub(conditions[0]) };
         let mut problem = CycleProblem {
-            system: System::new(n, &scheme.end, 1 + setting.freedom()),
+            system: System::new(n, &scheme.end, 1 + setting.freedom() + unused),
+            conditions,
             length: 0,
             width: 1,
             lengths: Vec::new(),
@@ -164,7 +171,8 @@ impl<'a> CycleProblem<'a> {
     pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
         let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
         problem.forcing_periods = cycle.forcing_periods;
-        problem.gain = cycle.gain.clone();
+        // The ends of a boundary-value problem are related by its conditions alone.
+        problem.gain = if problem.is_open() { Vec::new() } else { cycle.gain.clone() };
         problem.arrange();
         problem
     }
@@ -235,6 +243,11 @@ impl<'a> CycleProblem<'a> {
     pub fn with_equal_halves(mut self) -> Self {
         self.halves = true;
         self
+    }
+
+    /// k, the number of free parameters that are not determined by conditions.
+    fn freedom(&self) -> usize {
+        self.setting.freedom() - self.surplus()
     }
 
     /// The collocation scheme.
@@ -442,6 +455,9 @@ impl ZeroProblem for CycleProblem<'_> {
             let required = found.inner(&self.scheme, self.interval(found.interval));
             r[own.clone()].iter_mut().zip(&u[own]).zip(&required).for_each(|((r, x), flow)| *r = x - flow);
         }
+        if self.is_open() {
+            self.close(u, &all, r);
+        }
         r[size] = match self.is_forced() {
             true => u[size] - f64::from(self.forcing_periods),
             false => phase - self.phase_offset,
@@ -461,7 +477,10 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
-        self.system.solve(rhs, x);
+        match self.is_open() {
+            true => self.solve_open(rhs, x),
+            false => self.system.solve(rhs, x),
+        }
     }
 
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
@@ -528,7 +547,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let errors = self.errors(u);
         let tolerance = tolerance.max(self.rounding(u));
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
-        let lopsided = || !self.halves && self.nearly_doubled(u) && !mesh::in_halves(&self.mesh);
+        let lopsided = || !self.is_open() && !self.halves && self.nearly_doubled(u) && !mesh::in_halves(&self.mesh);
         (worst > tolerance || lopsided()).then(|| self.equidistributed(u, &errors, tolerance, KEPT)).flatten()
     }
 
@@ -551,6 +570,9 @@ impl ZeroProblem for CycleProblem<'_> {
     // profile; transition matrices of intervals are not. A canard is smooth along a repelling slow manifold, so its
     // intervals there are long, however fast neighbouring solutions depart.
     fn stability(&mut self, u: &[f64]) -> Examination {
+        if self.is_open() {
+            return self.degeneracy(u);
+        }
         let mut found = self.floquet(u);
         let trivial = usize::from(!self.is_forced());
         // A cycle that slides along a surface has lost a direction.
@@ -599,7 +621,10 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
-        self.multiplier_error(u, spectrum)
+        match self.is_open() {
+            true => self.errors(u).iter().fold(0.0, |most: f64, e| most.max(*e)),
+            false => self.multiplier_error(u, spectrum),
+        }
     }
 
     fn is_switched(&self) -> bool {
@@ -614,6 +639,13 @@ impl ZeroProblem for CycleProblem<'_> {
         let size = self.profile_size();
         let parameters = self.setting.at(&u[size + 1..]);
         let (mesh, profile, tangent) = self.cut(u, tangent);
+        let gain = match self.is_open() {
+            true => {
+                let [left, right] = self.both_ends(u);
+                right.iter().zip(&left).map(|(b, a)| b - a).collect()
+            }
+            false => self.gain.clone(),
+        };
         Point {
             position: 0,
             solution: Solution::Cycle(Cycle {
@@ -622,7 +654,7 @@ impl ZeroProblem for CycleProblem<'_> {
                 mesh,
                 degree: self.scheme.degree,
                 profile,
-                gain: self.gain.clone(),
+                gain,
             }),
             parameters,
             tangent,
@@ -637,7 +669,10 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
-        self.in_phase(beside, point, reflection, within)
+        match self.is_open() {
+            true => self.mirrored(beside, point, reflection, within),
+            false => self.in_phase(beside, point, reflection, within),
+        }
     }
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
