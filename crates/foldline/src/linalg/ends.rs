@@ -18,7 +18,7 @@
 //! **Fails when** the system (1)–(4) is singular to working precision.
 
 use super::chain::Chain;
-use super::{dot, lu};
+use super::lu;
 use crate::contract::Singular;
 
 /// Conditions (2) with the factorised system (1)–(4).
@@ -113,10 +113,10 @@ impl Ends {
         [z[..n].to_vec(), border, z[n..n + b].to_vec()]
     }
 
-    /// Left-hand sides of (2), for x_0, x_N `[n]` and σ `[q]`.
-    pub fn of(&self, [left, right]: [&[f64]; 2], scalars: &[f64]) -> Vec<f64> {
-        let (n, size) = (left.len(), 2 * left.len() + scalars.len());
-        let value = |row: &[f64]| dot(&row[..n], left) + dot(&row[n..2 * n], right) + dot(&row[2 * n..], scalars);
-        self.rows.chunks_exact(size.max(1)).map(value).collect()
+    /// Sum of the moduli of the terms of each condition at states of the size `scale` `[n]`.
+    pub fn sizes(&self, scale: &[f64]) -> Vec<f64> {
+        let n = scale.len();
+        let size = |row: &[f64]| row[..2 * n].iter().enumerate().map(|(k, x)| (x * scale[k % n]).abs()).sum();
+        self.rows.chunks_exact(self.pivots.len().max(1)).map(size).collect()
     }
 }

@@ -108,7 +108,8 @@ impl CycleProblem<'_> {
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             let corner = &mut corner[(first + r) * q..(first + 1 + r) * q];
             corner[0] = row[size] / (self.period_scale * self.period_scale);
-            corner[1..row.len() - size].copy_from_slice(&row[size + 1..]);
+            let scaled = corner[1..].iter_mut().zip(&row[size + 1..]).zip(&self.axis_scales);
+            scaled.for_each(|((to, x), scale)| *to = x / (scale * scale));
         }
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             self.fill_row(first + r, &row[..size]);

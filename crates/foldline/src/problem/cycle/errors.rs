@@ -82,6 +82,8 @@ pub(super) struct Measured {
     shift: Vec<f64>,
     /// Part of the error within intervals, `[n][m + 1][N]` at the sample points.
     within: Vec<f64>,
+    /// For a boundary-value problem, the error of the number that it has in place of multipliers.
+    degeneracy: f64,
 }
 
 impl CycleProblem<'_> {
@@ -265,18 +267,7 @@ impl CycleProblem<'_> {
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let measure = |field: &dyn VectorField, profile: &[f64], mesh: &[f64]| {
-            defect::measure(
-                field,
-                &parameters,
-                profile,
-                u[size],
-                self.forcing_periods,
-                mesh,
-                &self.scheme,
-                &self.sampling,
-                &scale,
-                &mut self.room.borrow_mut().measure,
-            )
+            self.defect(field, &parameters, profile, mesh, u[size], &scale)
         };
         let Defect { mut local, mut within, mut ends, mut sources, mut misses } =
             measure(self.setting.field, &u[..size], &self.mesh);
@@ -297,14 +288,7 @@ impl CycleProblem<'_> {
             ends[j * n..(j + 1) * n].copy_from_slice(&missed);
             misses[j * n..(j + 1) * n].copy_from_slice(&missed);
         }
-        let block = (self.scheme.degree + 1) * self.n;
-        let mut rhs = vec![0.0; u.len()];
-        for (own, (end, source)) in
-            rhs.chunks_exact_mut(block).zip(ends.chunks_exact(self.n).zip(sources.chunks_exact(inner)))
-        {
-            own[..self.n].copy_from_slice(end);
-            own[self.n..].copy_from_slice(source);
-        }
+        let rhs = self.defects_of(&ends, &sources, u.len());
         let mut shift = vec![0.0; u.len()];
         match self.is_open() {
             true => self.solve_defects(&rhs, &mut shift),
@@ -317,9 +301,49 @@ impl CycleProblem<'_> {
             .collect();
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
-        let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
+        let mut errors: Vec<f64> = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
+        let mut degeneracy = 0.0;
+        if self.is_open() {
+            let (others, off) = self.errors_of_response(u, &scale);
+            errors.iter_mut().zip(others).for_each(|(own, other)| *own = own.max(other));
+            degeneracy = off;
+        }
         let rounding = ROUNDING * self.intervals() as f64 * gain;
-        Measured { at: u.to_vec(), errors, rounding, shift, within }
+        Measured { at: u.to_vec(), errors, rounding, shift, within, degeneracy }
+    }
+
+    /// Estimated error of the number that a boundary-value problem has in place of multipliers.
+    pub(super) fn degeneracy_error(&self, u: &[f64]) -> f64 {
+        self.errors(u);
+        let off = self.measured.borrow().as_ref().map_or(f64::NAN, |known| known.degeneracy);
+        SPECTRUM_SAFE * off + floquet::ROUNDING
+    }
+
+    /// Defect of a profile.
+    pub(super) fn defect(
+        &self,
+        field: &dyn VectorField,
+        parameters: &[f64],
+        profile: &[f64],
+        mesh: &[f64],
+        period: f64,
+        scale: &[f64],
+    ) -> Defect {
+        let (room, periods) = (&mut self.room.borrow_mut().measure, self.forcing_periods);
+        defect::measure(field, parameters, profile, period, periods, mesh, &self.scheme, &self.sampling, scale, room)
+    }
+
+    /// Defects as right-hand sides, `[unknowns]`.
+    pub(super) fn defects_of(&self, ends: &[f64], sources: &[f64], unknowns: usize) -> Vec<f64> {
+        let (block, inner) = (self.block(), self.scheme.degree * self.n);
+        let mut rhs = vec![0.0; unknowns];
+        for (own, (end, source)) in
+            rhs.chunks_exact_mut(block).zip(ends.chunks_exact(self.n).zip(sources.chunks_exact(inner)))
+        {
+            own[..self.n].copy_from_slice(end);
+            own[self.n..].copy_from_slice(source);
+        }
+        rhs
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {

@@ -47,7 +47,7 @@ use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{all_finite, dot, larger, same};
+use crate::linalg::{all_finite, larger, same};
 use crate::stability::floquet::{self, Course, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
@@ -97,6 +97,8 @@ pub struct CycleProblem<'a> {
     unphased: bool,
     scale: Vec<f64>,
     period_scale: f64,
+    /// Sizes of the unknowns λ in the inner product: 1, or 1 + |λ| of those that conditions determine.
+    axis_scales: Vec<f64>,
     system: System,
     /// Number of places and lanes of the solver; see [`System`].
     length: usize,
@@ -137,6 +139,7 @@ impl<'a> CycleProblem<'a> {
             width: 1,
             lengths: Vec::new(),
             scale: setting.scales.to_vec(),
+            axis_scales: vec![1.0; setting.freedom()],
             setting,
             sampling: defect::Sampling::new(&scheme),
             scheme,
@@ -431,6 +434,9 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         self.scale = self.relative_scale(u);
         self.period_scale = u[self.profile_size()].abs().max(f64::MIN_POSITIVE);
+        let (surplus, values) = (self.surplus(), &u[self.profile_size() + 1..]);
+        let determined = self.axis_scales[..surplus].iter_mut().zip(values);
+        determined.for_each(|(scale, value)| *scale = 1.0 + value.abs());
         self.anchored.clear();
         self.anchored.extend_from_slice(u);
         self.unphased = true;
@@ -494,7 +500,12 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         total / n as f64
             + a[size] * b[size] / (self.period_scale * self.period_scale)
-            + dot(&a[size + 1..], &b[size + 1..])
+            + a[size + 1..]
+                .iter()
+                .zip(&b[size + 1..])
+                .zip(&self.axis_scales)
+                .map(|((a, b), s)| a * b / (s * s))
+                .sum::<f64>()
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
@@ -622,7 +633,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         match self.is_open() {
-            true => self.errors(u).iter().fold(0.0, |most: f64, e| most.max(*e)),
+            true => self.degeneracy_error(u),
             false => self.multiplier_error(u, spectrum),
         }
     }

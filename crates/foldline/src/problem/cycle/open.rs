@@ -14,16 +14,20 @@
 //! A solution has no multipliers. In their place stands one number 1 - d, with
 //!
 //! ```text
-//!   (3)  d = τ_λ sign(det J) / |J⁻¹ r|,   J = [F_u; τ],  τ the unit tangent, r a fixed vector
+//!   (3)  d = τ_λ sign(det J) / |y|,   J y = r,   J = [F_u; τ],  τ the unit tangent
 //! ```
 //!
-//! which has the sign of det F_u and passes through zero at folds (with τ_λ) and at simple branch points (with the
-//! second factor). It says nothing about stability, which a boundary-value problem does not have.
+//! and r a fixed vector with entries for the conditions alone, so that y solves the variational equation. d has the
+//! sign of det F_u and passes through zero at folds (with τ_λ) and at simple branch points (with 1/|y|). It says nothing
+//! about stability, which a boundary-value problem does not have.
+//!
+//! The mesh resolves y / |y| as well as the solution: next to a singular point that is the null vector, on which the
+//! place of the point depends, and which may vary faster than the solution.
 //!
 //! **Source.** ascher1995, §5; the bordered test function (3): govaerts2000, §4.
 
 use super::CycleProblem;
-use crate::contract::{Batch, Examination, Parameters, ZeroProblem};
+use crate::contract::{Batch, Examination, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Point, Solution};
 use crate::linalg::ends::Ends;
 use crate::linalg::lane::Lane;
@@ -152,24 +156,89 @@ impl CycleProblem<'_> {
 
     /// The number 1 - d of (3) in place of a spectrum, from the last factorisation.
     pub(super) fn degeneracy(&self, u: &[f64]) -> Examination {
-        let (count, size) = (u.len(), self.profile_size());
+        let count = u.len();
         let orientation = self.system.ends().map_or(1.0, Ends::orientation);
-        let length = |v: &[f64]| self.dot(v, v).sqrt();
         let (mut right, mut x) = (vec![0.0; count], vec![0.0; count]);
         right[count - 1] = 1.0;
         self.solve_open(&right, &mut x);
-        let slope = x[count - 1] / length(&x);
-        let wave = |k: usize| (0.3 + 0.7 * (k * k) as f64).sin();
-        right.iter_mut().enumerate().for_each(|(k, r)| {
-            *r = wave(k % self.block()) * if k < size { self.scale[k % self.n] } else { 0.0 };
-        });
-        self.solve_open(&right, &mut x);
-        let d = slope * orientation / length(&x);
+        let slope = x[count - 1] / self.dot(&x, &x).sqrt();
+        let d = slope * orientation * self.response().1;
         Examination {
             spectrum: vec![Complex64::new(1.0 - d, 0.0)],
             unstable: usize::from(d < 0.0),
             ..Default::default()
         }
+    }
+
+    /// y / |y| and 1 / |y| of (3), from the last factorisation.
+    fn response(&self) -> (Vec<f64>, f64) {
+        let (size, first, n) = (self.profile_size(), (self.intervals() - 1) * self.block(), self.n);
+        let count = self.unknowns();
+        let (mut right, mut y) = (vec![0.0; count], vec![0.0; count]);
+        let places = (first..first + n).chain(size + 1..size + 1 + self.surplus());
+        for (k, (place, weight)) in places.zip(self.sizes_of_conditions()).enumerate() {
+            right[place] = weight * (0.3 + 0.7 * (k * k) as f64).sin();
+        }
+        self.solve_open(&right, &mut y);
+        let length = self.dot(&y, &y).sqrt();
+        y.iter_mut().for_each(|y| *y /= length);
+        (y, 1.0 / length)
+    }
+
+    /// Size of every condition: its change if the states change by their scales.
+    fn sizes_of_conditions(&self) -> Vec<f64> {
+        let (n, block, length) = (self.n, self.block(), self.length);
+        let mut sizes = self.system.ends().map_or_else(Vec::new, |ends| ends.sizes(&self.scale));
+        for r in 0..self.integrals() {
+            let mut sum = 0.0;
+            either!(&self.system, s => {
+                let rows = &s.border[(1 + r) * length * block..(2 + r) * length * block];
+                for row in rows.chunks_exact(block) {
+                    let own = (0..n).flat_map(|c| (0..self.scheme.degree).map(move |k| (c, k)));
+                    own.for_each(|(c, k)| {
+                        let entry = row[n + s.slot(k, c)];
+                        sum += entry.lanes().iter().map(|x| x.abs()).sum::<f64>() * self.scale[c];
+                    });
+                }
+            });
+            sizes.push(sum);
+        }
+        sizes
+    }
+
+    /// Errors of y / |y| on every interval, and that of 1 / |y|, both estimated like those of the solution.
+    pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64) {
+        let (y, share) = self.response();
+        let (n, size, count) = (self.n, self.profile_size(), self.intervals());
+        let parameters = self.setting.at(&u[size + 1..]);
+        let field = Varied { field: self.setting.field, change: self.setting.spread(&y[size + 1..]) };
+        let both = u[..size].chunks_exact(n).zip(y.chunks_exact(n));
+        let profile: Vec<f64> = both.flat_map(|(x, y)| x.iter().chain(y)).copied().collect();
+        let sizes = [scale, scale].concat();
+        let found = self.defect(&field, &parameters, &profile, &self.mesh, u[size], &sizes);
+        let mut local = vec![0.0f64; count];
+        let half = found.within.len() / 2;
+        for (k, w) in found.within[half..].iter().enumerate() {
+            let component = k / count / (self.scheme.degree + 1);
+            local[k % count] = local[k % count].max((w / scale[component]).abs());
+        }
+        let second =
+            |all: &[f64]| -> Vec<f64> { all.chunks_exact(2 * n).flat_map(|both| &both[n..]).copied().collect() };
+        let misses = second(&found.misses);
+        let rhs = self.defects_of(&second(&found.ends), &second(&found.sources), u.len());
+        let mut shift = vec![0.0; u.len()];
+        self.solve_defects(&rhs, &mut shift);
+        let along = self.dot(&shift, &y);
+        shift.iter_mut().zip(&y).for_each(|(s, y)| *s -= along * y);
+        let off = (along * share).abs();
+        let sizes: Vec<f64> = misses
+            .chunks_exact(n)
+            .map(|e| e.iter().zip(scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
+            .collect();
+        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
+        let aside = self.dot(&shift, &shift).sqrt();
+        let gain = aside.max(off) / largest;
+        (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), off)
     }
 
     /// Copies of a point under a reflection; see [`ZeroProblem::images`].
@@ -196,5 +265,45 @@ impl CycleProblem<'_> {
         let tangent = [&moved(&point.tangent[..whole])[..], &point.tangent[whole..]].concat();
         let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
         if self.dot(&off, &off) <= within * within { vec![[u, tangent]] } else { Vec::new() }
+    }
+}
+
+/// A field with its variational equation: x' = f(x, p), y' = f_x y + f_p `change`, in the states (x, y).
+struct Varied<'a> {
+    field: &'a dyn VectorField,
+    /// `[k]`: the change of all parameters that belongs to y.
+    change: Vec<f64>,
+}
+
+impl VectorField for Varied<'_> {
+    fn dim(&self) -> usize {
+        2 * self.field.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.field.parameter_count()
+    }
+
+    fn forced(&self) -> bool {
+        self.field.forced()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        let half = self.field.dim() * at.lanes;
+        let (x, y) = at.states.split_at(half);
+        let (own, varied) = f.split_at_mut(half);
+        let batch = Batch { states: x, ..at };
+        self.field.evaluate(batch, own);
+        let along: Vec<f64> = y.iter().copied().chain(self.change.iter().flat_map(|p| vec![*p; at.lanes])).collect();
+        self.field.directional(batch, &[&along], varied);
+    }
+
+    // Only values are asked for.
+    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        [f, fx, fp].into_iter().for_each(|values| values.fill(f64::NAN));
+    }
+
+    fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {
+        out.fill(f64::NAN);
     }
 }
