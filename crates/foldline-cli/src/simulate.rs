@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::plot::picture;
 use crate::run::stop_on_interrupt;
 use crate::table::{Cell, Column, Style, Table, write};
-use crate::values::{measured, parameters, states};
+use crate::values::{measured, parameters, states, with_motions};
 use crate::verbosity::report;
 use foldline::contract::VectorField;
 use foldline::explore::course::{Course, Way, course};
@@ -28,6 +28,7 @@ const PERIODS: f64 = 20.0;
 /// Integrates from one initial state, and prints or draws the trajectory.
 pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
+    with_motions(&model)?;
     let parameters = parameters(&typed.set, &model)?;
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());

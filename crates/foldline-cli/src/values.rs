@@ -1,6 +1,7 @@
 //! Values of parameters and states given on the command line.
 
 use crate::failure::Failure;
+use foldline::contract::VectorField;
 use foldline::model::Model;
 use foldline::units::{Unit, quantity};
 use foldline_store::nearest::suggest;
@@ -76,4 +77,18 @@ pub fn parameter(name: &str, model: &Model) -> Result<usize, (String, String)> {
     let known = || model.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
     let unknown = || (format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known()));
     model.parameter_index(name).ok_or_else(unknown)
+}
+
+/// Refuses a boundary-value problem where motions from initial states are asked for.
+///
+/// # Errors
+/// The message for such a model.
+pub fn with_motions(model: &Model) -> Result<(), Failure> {
+    if model.conditions() == [0, 0] {
+        return Ok(());
+    }
+    let message =
+        format!("the model `{}` is a boundary-value problem: no motion starts from an initial state", model.name);
+    let cure = "follow its solutions with `foldline run` and a study: a first profile under [[seed]], and [[branch]]";
+    Err(Failure::typed(message, cure))
 }

@@ -1,7 +1,8 @@
 //! Columns of the tables.
 
 use super::{Cell, Column, Style, Table};
-use foldline::diagram::{Branch, Cost, Diagram, Origin, Point, Shown};
+use foldline::contract::VectorField;
+use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
@@ -13,8 +14,9 @@ const COEFFICIENTS: usize = 6;
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
-    columns.push(Column::in_unit("period", Style::Number, &model.time));
+    columns.push(Column::in_unit(duration(model), Style::Number, &model.time));
     columns.extend(turn_columns(model));
+    columns.extend(end_columns(model));
     columns.extend(output_columns(model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
@@ -25,7 +27,11 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
         let special = &branch.special[index];
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Word(special.kind.name().into())];
         row.extend(place_cells(&special.point, model));
-        row.extend([count(special.unstable_before), count(special.unstable_after), Cell::Number(special.error)]);
+        let unstable = [special.unstable_before, special.unstable_after].map(|number| match branch.family {
+            Family::Arc => Cell::Empty,
+            _ => count(number),
+        });
+        row.extend(unstable.into_iter().chain([Cell::Number(special.error)]));
         let form = special.normal_form();
         row.push(if form.is_empty() { Cell::Empty } else { Cell::Word(form) });
         let number = |list: &[f64], k: usize| list.get(k).map_or(Cell::Empty, |value| Cell::Number(*value));
@@ -44,8 +50,9 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
 pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
-    columns.push(Column::in_unit("period", Style::Number, &model.time));
+    columns.push(Column::in_unit(duration(model), Style::Number, &model.time));
     columns.extend(turn_columns(model));
+    columns.extend(end_columns(model));
     columns.extend(output_columns(model));
     columns.extend(model.outputs.iter().map(|o| Column::in_unit(&format!("{}_min", o.name), Style::Number, &o.unit)));
     let ended = |name: &str, unit: &str, endings: [&str; 2]| {
@@ -70,13 +77,15 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
         row.extend(
             (n..n + model.outputs.len()).chain(0..n).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]),
         );
-        row.push(count(point.unstable));
+        row.push(if branch.family == Family::Arc { Cell::Empty } else { count(point.unstable) });
         let trust = point.trust;
         let sizes =
             [trust.discretisation, trust.residual, trust.trivial_defect, trust.liouville_defect, trust.spectrum];
         row.extend(sizes.map(Cell::Number));
         row.extend(work(point.cost).map(count));
-        row.push(Cell::Spectrum(point.spectrum.clone()));
+        // A boundary-value problem has no multipliers.
+        let spectrum = if branch.family == Family::Arc { Vec::new() } else { point.spectrum.clone() };
+        row.push(Cell::Spectrum(spectrum));
         row
     };
     let shown = diagram.branches.iter().filter(|b| kept(b));
@@ -140,6 +149,22 @@ fn turn_columns(model: &Model) -> impl Iterator<Item = Column> {
     model.angles().map(|(k, _)| column(&format!("{}_turns", model.states[k].name), Style::Number))
 }
 
+/// Name of the column of periods, or of the length of the interval of a boundary-value problem.
+fn duration(model: &Model) -> &'static str {
+    if model.conditions() == [0, 0] { "period" } else { "length" }
+}
+
+/// The states at both ends of the interval of a boundary-value problem: index, place, and name of the column.
+fn ends(model: &Model) -> impl Iterator<Item = (usize, f64, String)> {
+    let places: &[f64] = if model.conditions() == [0, 0] { &[] } else { &[0.0, 1.0] };
+    let states = model.states.iter().enumerate();
+    states.flat_map(move |(k, state)| places.iter().map(move |at| (k, *at, format!("{}@{at}", state.name))))
+}
+
+fn end_columns(model: &Model) -> impl Iterator<Item = Column> {
+    ends(model).map(|(k, _, name)| Column::in_unit(&name, Style::Number, &model.states[k].unit))
+}
+
 fn origin(origin: &Origin) -> String {
     match origin {
         Origin::Seed(name) => format!("seed {name}"),
@@ -170,7 +195,14 @@ fn place_cells(point: &Point, model: &Model) -> Vec<Cell> {
         Some(_) => Cell::Count(point.solution.turns(k, turn)),
         None => Cell::Empty,
     });
-    parameters.chain([period]).chain(turns).chain((n..n + model.outputs.len()).map(|k| extreme(point, k, 1))).collect()
+    let at_ends =
+        ends(model).map(|(k, at, _)| Quantity::At(k, at.to_bits()).of(point).map_or(Cell::Empty, Cell::Number));
+    parameters
+        .chain([period])
+        .chain(turns)
+        .chain(at_ends)
+        .chain((n..n + model.outputs.len()).map(|k| extreme(point, k, 1)))
+        .collect()
 }
 
 fn extreme(point: &Point, variable: usize, end: usize) -> Cell {

@@ -6,6 +6,7 @@ mod responses;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
+use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
@@ -79,7 +80,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Points | What::Branches => Part::Numbers,
         What::Special | What::Responses | What::Notes => Part::Special,
     };
-    let run = read(&typed.folder, part)?;
+    let mut run = read(&typed.folder, part)?;
+    if run.model.conditions() != [0, 0] && matches!(typed.what(), What::Points | What::Special) {
+        // The states at the ends of an interval are part of the profiles.
+        run = read(&typed.folder, Part::Everything)?;
+    }
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let conversion = conversion(&run.model, &typed.unit)?;
     let shown = conversion.as_ref().map(|own| own.diagram(run.diagram.clone()));

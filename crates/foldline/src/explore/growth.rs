@@ -460,7 +460,16 @@ impl Growth<'_> {
             let along: Vec<f64> = along.iter().map(|t| direction * t).collect();
             u.len() == along.len() && problem.hold_branch(&u, &along)
         };
-        let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
+        // A boundary-value problem has no stability, and stored points say so; on the way, a sign is counted.
+        let counted_at = |point: &Point| match branch.family {
+            Family::Arc => usize::from(point.spectrum.first().is_some_and(|z| z.re > 1.0)),
+            _ => point.unstable,
+        };
+        let revive = |problem: &mut dyn ZeroProblem, point: &Point| {
+            let mut found = revived(problem, self.settings, point, direction)?;
+            found.point.unstable = counted_at(point);
+            Ok::<Station, Failure>(found)
+        };
         // The special point at which a branch starts is no predecessor: the matrix is singular there.
         let before = before.filter(|p| p.position != 0 || starts_inside(branch));
         // Beyond a switching surface the branch has another direction.
@@ -500,7 +509,8 @@ impl Growth<'_> {
                 marks.extend(sliding::monitors(system.field));
             }
         }
-        let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
+        let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none());
+        let home = home.map(|point| Point { unstable: counted_at(point), ..point.clone() });
         let limits = Limits {
             field: system.field,
             free: branch.free,
@@ -531,7 +541,7 @@ impl Growth<'_> {
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
         let mut record = Record::at(&last, side == 1);
-        let recorded = self.settings.stability && branch.held.is_none();
+        let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
@@ -540,6 +550,9 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
+                    if branch.family == Family::Arc {
+                        (special.unstable_before, special.unstable_after) = (0, 0);
+                    }
                     // A mere turning point of a curve has none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
                         let found = self.coefficients(&system, branch, side, &special);
@@ -602,9 +615,12 @@ impl Growth<'_> {
         self.observer.observe(event) == Verdict::Continue
     }
 
-    pub(super) fn accept(&self, branch: &mut Branch, point: Point) -> bool {
+    pub(super) fn accept(&self, branch: &mut Branch, mut point: Point) -> bool {
         if self.observer.stopping() {
             return false;
+        }
+        if branch.family == Family::Arc {
+            point.unstable = 0;
         }
         branch.insert(point.clone());
         let going = self.tell(Event::Point(branch, &point));

@@ -177,6 +177,18 @@ pub fn verify(
         let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
+        if system.is_open() {
+            let why = "solutions of boundary-value problems are not recomputed yet";
+            let undecided = |position: i64, special: Option<Kind>| Undecided {
+                branch: branch.name.clone(),
+                position,
+                special,
+                why,
+            };
+            out.undecided.extend(chosen.iter().map(|i| undecided(branch.points[*i].position, None)));
+            out.undecided.extend(branch.special.iter().map(|own| undecided(own.point.position, Some(own.kind))));
+            continue;
+        }
         let setting = setting(system, branch);
         match system.field.iterated() {
             true => out.add(maps::points(&setting, branch, &chosen)),

@@ -82,7 +82,7 @@ pub(super) struct Measured {
     shift: Vec<f64>,
     /// Part of the error within intervals, `[n][m + 1][N]` at the sample points.
     within: Vec<f64>,
-    /// For a boundary-value problem, the error of the number that it has in place of multipliers.
+    /// For a boundary-value problem, the relative error of the number that it has in place of multipliers.
     degeneracy: f64,
 }
 
@@ -313,10 +313,13 @@ impl CycleProblem<'_> {
     }
 
     /// Estimated error of the number that a boundary-value problem has in place of multipliers.
-    pub(super) fn degeneracy_error(&self, u: &[f64]) -> f64 {
+    pub(super) fn degeneracy_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+        /// Of the sign of the slope, next to a branch point, where the matrix is nearly singular.
+        const ROUNDING: f64 = 100.0 * f64::EPSILON;
         self.errors(u);
         let off = self.measured.borrow().as_ref().map_or(f64::NAN, |known| known.degeneracy);
-        SPECTRUM_SAFE * off + floquet::ROUNDING
+        let size = spectrum.first().map_or(f64::NAN, |z| (z - 1.0).norm());
+        SPECTRUM_SAFE * off * size + ROUNDING
     }
 
     /// Defect of a profile.

@@ -633,7 +633,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         match self.is_open() {
-            true => self.degeneracy_error(u),
+            true => self.degeneracy_error(u, spectrum),
             false => self.multiplier_error(u, spectrum),
         }
     }

@@ -163,11 +163,9 @@ impl CycleProblem<'_> {
         self.solve_open(&right, &mut x);
         let slope = x[count - 1] / self.dot(&x, &x).sqrt();
         let d = slope * orientation * self.response().1;
-        Examination {
-            spectrum: vec![Complex64::new(1.0 - d, 0.0)],
-            unstable: usize::from(d < 0.0),
-            ..Default::default()
-        }
+        let spectrum = vec![Complex64::new(1.0 - d, 0.0)];
+        // The number of negative d tells folds from branch points.
+        Examination { spectrum, unstable: usize::from(d < 0.0), ..Examination::default() }
     }
 
     /// y / |y| and 1 / |y| of (3), from the last factorisation.
@@ -206,7 +204,7 @@ impl CycleProblem<'_> {
         sizes
     }
 
-    /// Errors of y / |y| on every interval, and that of 1 / |y|, both estimated like those of the solution.
+    /// Errors of y / |y| on every interval, and the relative error of |y|, both estimated like those of the solution.
     pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64) {
         let (y, share) = self.response();
         let (n, size, count) = (self.n, self.profile_size(), self.intervals());
@@ -238,7 +236,7 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let aside = self.dot(&shift, &shift).sqrt();
         let gain = aside.max(off) / largest;
-        (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), off)
+        (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), along.abs())
     }
 
     /// Copies of a point under a reflection; see [`ZeroProblem::images`].
