@@ -176,6 +176,20 @@ pub(super) fn refused(source: &ModelSource) -> Vec<ModelError> {
     found
 }
 
+/// Error of a boundary-value problem that is not smooth.
+pub(super) fn switched(model: &Model) -> Option<ModelError> {
+    if model.conditions() == [0, 0] || model.switch_count() == 0 {
+        return None;
+    }
+    let message = format!(
+        "the equations are not smooth where {} = 0: boundary-value problems with switching points (abs, max, min, sign, \
+         if, comparisons) are not supported",
+        model.switch_name(0)
+    );
+    let hint = "replace the corner by a smooth function, such as sqrt(x^2 + eps^2) for abs(x)".to_string();
+    Some(ModelError { item: Item::Equation(0), field: Field::Name, name: String::new(), span: None, message, hint })
+}
+
 impl Model {
     /// The conditions at the ends and their derivatives, as [`VectorField::boundary`] orders them.
     fn end_tape(&self, free: &[usize]) -> Arc<Tape> {

@@ -215,7 +215,7 @@ impl Model {
             condition_tapes: Default::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
-        let wrong = model.wrong_period().or_else(|| iterated::switched(&model));
+        let wrong = model.wrong_period().or_else(|| iterated::switched(&model)).or_else(|| boundary::switched(&model));
         match wrong.or_else(|| angles::no_angle(&model, &items)) {
             Some(error) => Err(vec![error]),
             None => Ok(model),

@@ -203,8 +203,11 @@ impl Check<'_> {
             wait.extend(more.into_iter().filter_map(|(body, span, hidden)| Some((body?, Some(span), hidden))));
         }
         if let Some((name, what, span)) = wrong {
-            let message = format!("the forcing depends on `{name}`, which is {what}");
-            let hint = "its frequency or period may contain only numbers and parameters";
+            let [own, hint] = match source.boundary {
+                None => ["the forcing", "its frequency or period may contain only numbers and parameters"],
+                Some(_) => ["the length of the interval", "it may contain only numbers and parameters"],
+            };
+            let message = format!("{own} depends on `{name}`, which is {what}");
             self.complain(Item::Forcing, Field::Expression, Complaint::new(span, message, hint));
         }
     }

@@ -61,7 +61,10 @@ impl Quantity {
             Quantity::Iterate(k, number) => iterate(point, k, number),
             Quantity::At(k, place) => match &point.solution {
                 Solution::Cycle(cycle) if !cycle.profile.is_empty() => {
-                    cycle.state(f64::from_bits(place)).get(k).copied()
+                    // A value that a condition makes zero has the rounding of the others.
+                    let size = point.ranges.get(k).map_or(0.0, |[low, high]| low.abs().max(high.abs()));
+                    let value = cycle.state(f64::from_bits(place)).get(k).copied();
+                    value.map(|value| if value.abs() < 4.0 * f64::EPSILON * size { 0.0 } else { value })
                 }
                 _ => None,
             },

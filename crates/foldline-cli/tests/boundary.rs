@@ -1,0 +1,241 @@
+//! Boundary-value problems: against closed forms and published values.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Point, SpecialPoint};
+use foldline::explore::{self, System};
+use foldline::model::Model;
+use foldline::special::quantity::Quantity;
+use foldline_store::study_file::{Study, parse_study};
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Study of a model in the repository.
+#[track_caller]
+fn of(model: &str, study: &str) -> (Study, Diagram) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(format!("{model}.toml"));
+    given(&std::fs::read_to_string(path).unwrap(), study)
+}
+
+#[track_caller]
+fn given(model: &str, study: &str) -> (Study, Diagram) {
+    let text = format!("model = \"m\"\n{study}");
+    let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    drop(system);
+    (study, diagram)
+}
+
+/// Every mistake in a model and a study, as message and cure.
+fn mistakes(model: &str, study: &str) -> String {
+    let found = parse_study(&format!("model = \"m\"\n{study}"), "study", model, "model").unwrap_err();
+    found
+        .iter()
+        .map(|d| format!("{}:{}: {} ({})\n", d.line, d.column, d.message, d.hint.as_deref().unwrap_or("")))
+        .collect()
+}
+
+fn seeded(seed: &str, free: &str, range: &str, more: &str) -> String {
+    format!(
+        "tolerance = 1e-9\n[[seed]]\nname = \"s\"\n{seed}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"{free}\"\n\
+         range = {range}\n{more}\n"
+    )
+}
+
+#[track_caller]
+fn value(model: &Model, name: &str, point: &Point) -> f64 {
+    Quantity::named(name, model).and_then(|quantity| quantity.of(point)).unwrap_or_else(|| panic!("{name}"))
+}
+
+#[track_caller]
+fn near(value: f64, known: f64, within: f64) {
+    assert!((value - known).abs() <= within * (1.0 + known.abs()), "{value} is not {known}");
+}
+
+fn of_kind(branch: &Branch, kind: Kind) -> Vec<&SpecialPoint> {
+    branch.special.iter().filter(|s| s.kind == kind).collect()
+}
+
+#[track_caller]
+fn complete(diagram: &Diagram) {
+    for branch in &diagram.branches {
+        assert!(branch.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{:?}", branch.ends);
+        assert_eq!(branch.family, Family::Arc);
+        assert!(branch.special.iter().all(|s| s.kind != Kind::Unexplained), "{}", branch.name);
+        assert!(branch.points.iter().all(|p| p.unstable == 0), "there is no stability");
+    }
+}
+
+#[test]
+fn two_solutions_of_bratu_s_problem_meet_where_the_slope_at_the_wall_is_four() {
+    let (study, diagram) = of("bratu", &seeded("state = \"zero\"", "p", "[0, 4]", "stop = { u_max = 8 }"));
+    complete(&diagram);
+    let [fold] = of_kind(diagram.branch("b").unwrap(), Kind::Fold)[..] else { panic!() };
+    near(fold.point.parameters[0], 3.513830719125, 1e-10);
+    assert!((fold.point.parameters[0] - 3.513830719125).abs() <= fold.error.max(1e-12));
+    for (name, known) in [("u'@0", 4.0), ("u'@1", -4.0), ("u@0.5", 1.186842168634), ("u_max", 1.186842168634)] {
+        near(value(&study.model, name, &fold.point), known, 1e-8);
+    }
+}
+
+/// u'' = -p exp(u), u(0) = u(1), ∫u dx = 0: c and p = 2 c² exp(2 - 2 ln cosh(c/2)) in closed form.
+#[test]
+fn an_integral_takes_the_place_of_a_boundary_condition() {
+    let model = "[interval]\nlength = 1\n[parameters]\np = 0\n[states.\"u''\"]\nequation = \"-p*exp(u)\"\n[boundary]\n\
+        same = \"u@0 - u@1\"\n[integrals]\nmean = \"u\"\n";
+    let (study, diagram) = given(model, &seeded("state = \"zero\"", "p", "[0, 15]", "stop = { u_max = 4 }"));
+    complete(&diagram);
+    let [fold] = of_kind(diagram.branch("b").unwrap(), Kind::Fold)[..] else { panic!() };
+    near(fold.point.parameters[0], 11.923790200648, 1e-10);
+    for (name, known) in [("u@0", -2.0), ("u@1", -2.0), ("u@0.5", 1.292714781747), ("u_mean", 0.0)] {
+        near(value(&study.model, name, &fold.point), known, 1e-8);
+    }
+}
+
+#[test]
+fn a_slab_ignites_and_is_extinguished_at_folds() {
+    for (e, known) in [(0.1, vec![3.952831214835]), (0.23, vec![4.980849511181, 4.746725632792])] {
+        let seed = format!("state = \"zero\"\nparameters = {{ e = {e} }}");
+        let (_, diagram) = of("thermal-explosion", &seeded(&seed, "p", "[0, 8]", ""));
+        complete(&diagram);
+        let folds = of_kind(diagram.branch("b").unwrap(), Kind::Fold);
+        assert_eq!(folds.len(), 2);
+        for (fold, known) in folds.iter().zip(known) {
+            near(fold.point.parameters[0], known, 1e-10);
+        }
+    }
+}
+
+/// θ(0) = α where p = (2 K(sin(α/2)))², and the ends are 2 E/K - 1 apart.
+#[test]
+fn a_rod_buckles_at_pitchforks_into_the_shapes_of_the_elastica() {
+    let more = "switch = { branch-point = 1 }\nmark = { th_max = [0.5, 2] }";
+    let (study, diagram) = of("elastica", &seeded("state = \"zero\"", "p", "[5, 120]", more));
+    complete(&diagram);
+    let straight = of_kind(diagram.branch("b").unwrap(), Kind::BranchPoint);
+    assert_eq!(straight.len(), 3);
+    for (n, point) in straight.iter().enumerate() {
+        near(point.point.parameters[0], ((n + 1) as f64 * PI).powi(2), 1e-10);
+    }
+    let buckled = diagram.branch("b/branch-point-1").unwrap();
+    let marks = of_kind(buckled, Kind::Mark);
+    for (mark, (p, apart)) in marks.iter().zip([(10.1850010812, 0.938308047), (17.4295934851, 0.185033604)]) {
+        near(mark.point.parameters[0], p, 1e-9);
+        near(value(&study.model, "along_integral", &mark.point), apart, 1e-8);
+        near(value(&study.model, "th@0", &mark.point).abs(), value(&study.model, "th_max", &mark.point), 1e-9);
+    }
+    assert_eq!(marks.len(), 2);
+    // One half of the pitchfork of an odd mode; the two halves of an even one are shifts of each other.
+    assert!(diagram.branches.len() == 4, "{:?}", diagram.branches.iter().map(|b| &b.name).collect::<Vec<_>>());
+}
+
+/// The n-th mode, w = a sin(n π x), carries p = n² π² (1 + k a²/4).
+#[test]
+fn an_unknown_is_determined_by_a_further_condition() {
+    let more = "switch = { branch-point = 1 }\nmark = { w_rms = [0.5, 1] }";
+    let (study, diagram) = of("buckled-beam", &seeded("state = \"zero\"", "p", "[5, 200]", more));
+    complete(&diagram);
+    for n in [1.0, 2.0] {
+        let branch = diagram.branch(&format!("b/branch-point-{n}")).unwrap();
+        let mut seen = 0;
+        for mark in of_kind(branch, Kind::Mark) {
+            let square = 2.0 * value(&study.model, "w_rms", &mark.point).powi(2);
+            near(mark.point.parameters[0], n * n * PI * PI * (1.0 + 0.5 * square), 1e-8);
+            near(mark.point.parameters[2], 0.25 * n * n * PI * PI * square, 1e-8);
+            seen += 1;
+        }
+        assert_eq!(seen, 2);
+    }
+}
+
+/// u = x⁴ + c x on [0, L], u(L) = 1, from a first profile in terms of the independent variable.
+#[test]
+fn length_and_independent_variable_enter_the_equations() {
+    let model = "[interval]\nlength = \"L\"\nvariable = \"x\"\n[parameters]\nL = 2\n[states.\"u''\"]\n\
+        equation = \"12*x^2\"\n[boundary]\nleft = \"u@0\"\nright = \"u@1 - 1\"\n";
+    let seed = "state = { u = \"x/L\", \"u'\" = \"1/L\" }";
+    let (study, diagram) = given(model, &seeded(seed, "L", "[0.5, 2]", "mark = { L = [0.5, 1.5] }"));
+    complete(&diagram);
+    let marks = of_kind(diagram.branch("b").unwrap(), Kind::Mark);
+    assert_eq!(marks.len(), 2);
+    for mark in marks {
+        let length = mark.point.parameters[0];
+        near(value(&study.model, "u'@0", &mark.point), (1.0 - length.powi(4)) / length, 1e-10);
+        near(value(&study.model, "period", &mark.point), length, 1e-14);
+    }
+}
+
+/// u'' = -u, u(0) = 0, u(1)² + u(1) = λ: folds where the condition does.
+#[test]
+fn a_nonlinear_condition_has_exact_derivatives() {
+    let model = "[interval]\nlength = 1\n[parameters]\na = 0\n[states.\"u''\"]\nequation = \"-u\"\n[boundary]\n\
+        left = \"u@0\"\nright = \"u@1^2 + u@1 - a\"\n";
+    let (study, diagram) = given(model, &seeded("state = \"zero\"", "a", "[-1, 2]", ""));
+    complete(&diagram);
+    let [fold] = of_kind(diagram.branch("b").unwrap(), Kind::Fold)[..] else { panic!() };
+    near(fold.point.parameters[0], -0.25, 1e-10);
+    near(value(&study.model, "u'@0", &fold.point), -0.5 / 1f64.sin(), 1e-8);
+}
+
+#[test]
+fn a_branch_is_resumed_as_if_it_had_not_been_interrupted() {
+    let text = |points: usize| {
+        seeded("state = \"zero\"", "p", "[0, 4]", &format!("stop = {{ u_max = 8 }}\nmax-points = {points}"))
+    };
+    let (_, whole) = of("bratu", &text(1000));
+    let (_, part) = of("bratu", &text(30));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/bratu.toml");
+    let model = std::fs::read_to_string(path).unwrap();
+    let study = parse_study(&format!("model = \"m\"\n{}", text(1000)), "study", &model, "model").unwrap();
+    let mut earlier = part.clone();
+    earlier.branches.iter_mut().for_each(|branch| branch.ends = [None, None]);
+    let system = System::of_plan(&study.model, &study.plan);
+    let again = explore::run(&system, &study.plan, 1, earlier, &Unobserved);
+    let [one, other] = [&whole, &again].map(|diagram| of_kind(diagram.branch("b").unwrap(), Kind::Fold)[0].clone());
+    near(one.point.parameters[0], other.point.parameters[0], 1e-12);
+    complete(&again);
+}
+
+#[test]
+fn mistakes_are_answered_with_place_cause_and_cure() {
+    let model = |interval: &str, boundary: &str| {
+        format!(
+            "[interval]\n{interval}\n[parameters]\np = 0\n[states.\"u''\"]\nequation = \"-p*exp(u)\"\n[boundary]\n{boundary}\n"
+        )
+    };
+    let study = seeded("state = \"zero\"", "p", "[0, 4]", "");
+    let cases = [
+        (model("length = 1", "left = \"u@0\""), "1 boundary condition and 0 integral conditions for 2 states"),
+        (model("length = 1", "a = \"u@0\"\nb = \"u@1\"\nc = \"u'@0 - 1\""), "solve = "),
+        (model("length = 1", "a = \"u\"\nb = \"u@1\""), "without saying at which end"),
+        (model("length = 1", "a = \"v@0\"\nb = \"u@1\""), "unknown name `v@0`"),
+        (model("variable = \"x\"", "a = \"u@0\"\nb = \"u@1\""), "the interval has no length"),
+        (model("length = \"u\"", "a = \"u@0\"\nb = \"u@1\""), "the length of the interval depends on `u`"),
+        (model("length = 1\nsolve = [\"q\"]", "a = \"u@0\"\nb = \"u@1\"\nc = \"u'@0\""), "`q` is not a parameter"),
+        (model("length = 1", "a = \"u@0\"\nb = \"u@1\"").replace("-p*exp(u)", "-p*abs(u)"), "not smooth"),
+    ];
+    for (model, said) in cases {
+        let found = mistakes(&model, &study);
+        assert!(found.contains(said), "{said}\n{found}");
+    }
+    let good = model("length = 1", "a = \"u@0\"\nb = \"u@1\"");
+    for (study, said) in [
+        (seeded("attractor = \"cycle\"", "p", "[0, 4]", ""), "a boundary-value problem has no attractor"),
+        (seeded("state = { u = 0 }", "p", "[0, 4]", ""), "the profile lacks u'"),
+        (seeded("state = { u = \"sin(y)\", \"u'\" = 0 }", "p", "[0, 4]", ""), "the profile of `u`: unknown name `y`"),
+        (
+            format!("{study}[[survey]]\nname = \"v\"\nfree = \"p\"\nat = [1]\n"),
+            "no motion starts from an initial state",
+        ),
+        (
+            format!("{study}[[curve]]\nname = \"c\"\nof = \"b\"\nhold = \"fold\"\nfree = \"p\"\nrange = [0, 1]\n"),
+            "curves in two parameters are not followed for boundary-value problems",
+        ),
+    ] {
+        let found = mistakes(&good, &study);
+        assert!(found.contains(said), "{said}\n{found}");
+    }
+    let solved = model("length = 1\nsolve = [\"p\"]", "a = \"u@0\"\nb = \"u@1\"\nc = \"u'@0 - 1\"");
+    let found = mistakes(&solved, &study);
+    assert!(found.contains("`p` is determined by the conditions"), "{found}");
+}
