@@ -36,6 +36,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         }
     }
     let others = [
+        "boundary-value-problems",
         "contact",
         "friction",
         "endings",
