@@ -24,6 +24,7 @@
 //! | what does simulation find? | [`responses`] |
 
 mod accounts;
+mod arcs;
 mod arrival;
 mod averaged;
 mod choice;

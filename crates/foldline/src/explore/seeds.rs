@@ -5,10 +5,11 @@
 //! once it has found what they ask for.
 
 use super::System;
+use super::arcs::from_arc;
 use super::choice::{Choice, is_meant, missing, summary};
 use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
-use super::given::{from_arc, from_cycle};
+use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
 use super::maps;
 use super::minimal::reduced;
