@@ -112,6 +112,14 @@ pub fn broken(texts: &[Text]) -> Vec<String> {
             found.push(format!("{}: unsafe code is not allowed in any crate", text.place(at)));
         }
     }
+    for text in texts {
+        // Marks that an unfinished merge leaves.
+        let marks = ["<<<<<<< ", ">>>>>>> "];
+        for (k, _) in text.text.lines().enumerate().filter(|(_, line)| marks.iter().any(|mark| line.starts_with(mark)))
+        {
+            found.push(format!("{}:{}: both sides of a conflict are still there", text.name, k + 1));
+        }
+    }
     found
 }
 
@@ -144,6 +152,13 @@ mod tests {
 
     fn found(name: &str, text: &str) -> Vec<String> {
         broken(&[Text { name: name.to_string(), text: text.to_string() }])
+    }
+
+    #[test]
+    fn the_marks_of_a_conflict_are_reported() {
+        let expected = "CHANGELOG.md:2: both sides of a conflict are still there";
+        assert_eq!(found("CHANGELOG.md", "* one\n<<<<<<< HEAD\n* two\n"), [expected]);
+        assert_eq!(found("CHANGELOG.md", "Title\n=======\n"), [""; 0]);
     }
 
     #[test]
