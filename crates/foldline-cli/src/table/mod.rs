@@ -10,6 +10,7 @@ use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
 use foldline::model::Model;
+use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::{Part, load_part};
@@ -79,16 +80,27 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Points | What::Branches => Part::Numbers,
         What::Special | What::Responses | What::Notes => Part::Special,
     };
-    let run = read(&typed.folder, part)?;
+    let mut run = read(&typed.folder, part)?;
+    let record = std::mem::take(&mut run.plan.record);
+    let recorded: Vec<Quantity> = record.iter().map(|(_, quantity)| *quantity).collect();
+    if typed.what() == What::Points && recorded.iter().any(|quantity| quantity.needs_profile()) {
+        run = read(&typed.folder, Part::Everything)?;
+    }
+    if matches!(typed.what(), What::Points | What::Special) {
+        for branch in &mut run.diagram.branches {
+            let special = branch.special.iter_mut().map(|special| &mut special.point);
+            branch.points.iter_mut().chain(special).for_each(|point| append(point, &recorded, &run.model));
+        }
+    }
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let conversion = conversion(&run.model, &typed.unit)?;
     let shown = conversion.as_ref().map(|own| own.diagram(run.diagram.clone()));
     let (diagram, model) =
         (shown.as_ref().unwrap_or(&run.diagram), conversion.as_ref().map_or(&run.model, |own| own.model()));
     let table = match typed.what() {
-        What::Points => columns::points(diagram, model, &kept),
+        What::Points => columns::points(diagram, model, &record, &kept),
         What::Branches => columns::branches(diagram, model, &kept),
-        What::Special => columns::special(diagram, model, &kept),
+        What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };

@@ -9,6 +9,7 @@
 mod branches;
 mod curves;
 mod explorations;
+mod holds;
 mod homotopies;
 mod items;
 mod profiles;
@@ -23,6 +24,7 @@ use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
 use foldline::explore::Plan;
 use foldline::model::{Model, conserved, in_words};
+use foldline::special::quantity::Quantity;
 use items::Items;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -59,7 +61,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 17] = [
+const ROOT_KEYS: [&str; 18] = [
     "model",
     "title",
     "description",
@@ -69,6 +71,7 @@ const ROOT_KEYS: [&str; 17] = [
     "max-steps",
     "max-time",
     "store",
+    "record",
     "parameters",
     "seed",
     "branch",
@@ -207,6 +210,13 @@ fn parse(
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
     }
+    let record: Vec<(String, Quantity)> = root
+        .get("record")
+        .map(|value| branches::quantities(&mut walk, value, "`record`", &model))
+        .into_iter()
+        .flatten()
+        .map(|(quantity, span)| (text[span].trim_matches(['"', '\'']).to_string(), quantity))
+        .collect();
     let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
@@ -240,6 +250,7 @@ fn parse(
         explorations,
         surveys,
         sweeps,
+        record,
     };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
 }
