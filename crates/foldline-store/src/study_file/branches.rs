@@ -67,6 +67,13 @@ pub(super) fn read(
     if let (Some(Some(held)), Some((start, _, family))) = (&held, &origin) {
         holds::fits(walk, item, held, start, *family, ground);
     }
+    if let (None, Some(index), Some(value)) = (&held, free, table.get("peaks"))
+        && marks.iter().any(|mark| mark.peak && matches!(mark.quantity, Quantity::Parameter(_)))
+    {
+        let name = &ground.model.parameters[index].name;
+        let message = format!("{name} turns at folds, which are found anyway, and the other parameters are constant");
+        walk.report(value.span(), message, "quantities of the solution, such as `peaks = [\"x_max\"]`");
+    }
     let (name, (start, beginning, family), free, (range, until)) = (name?, origin?, free?, bounds?);
     let mut end = beginning.clone();
     end[free] = until;
@@ -215,14 +222,7 @@ pub(super) fn marks(walk: &mut Walk, table: &DeTable, model: &Model) -> Vec<Mark
     let mut marks = values(walk, table.get("mark"), "`mark`", false, model);
     marks.extend(values(walk, table.get("stop"), "`stop`", true, model));
     let peaks = table.get("peaks").map(|value| quantities(walk, value, "`peaks`", model));
-    for (quantity, span) in peaks.into_iter().flatten() {
-        if matches!(quantity, Quantity::Parameter(_)) {
-            let message = "a parameter turns at a fold, which is found without being asked for";
-            walk.report(span, message, "a quantity of the solution, such as `peaks = [\"x_max\"]`");
-        } else {
-            marks.push(Mark::peak(quantity));
-        }
-    }
+    marks.extend(peaks.into_iter().flatten().map(|(quantity, _)| Mark::peak(quantity)));
     marks
 }
 
