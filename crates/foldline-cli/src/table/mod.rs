@@ -151,7 +151,7 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
-        let special = columns::special(diagram, model, &|_| true);
+        let special = columns::special(diagram, model, &[], &|_| true);
         if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
     }
     if !diagram.responses.is_empty() {

@@ -18,7 +18,7 @@
 //!
 //! **Fails when** two maxima have equal values: the largest value has a corner there, and (3) belongs to one of them.
 
-use super::harmonics::{Measured, Signal, Term};
+use super::harmonics::{Measured, Order, Signal, Term};
 use super::quantity::{Quantity, decibels, wrapped};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Cycle, Point, Solution};
@@ -394,7 +394,7 @@ impl<'a> Along<'a> {
                 let [re, im] = self.coefficient(term.signal, order.in_cycle(self.solution.forcing_periods())?)?;
                 let c = Complex64::new(re.value, im.value);
                 let square = c.norm_sqr();
-                let degrees = 360.0 / TAU;
+                let degrees = lagging(order) * 360.0 / TAU;
                 // -Im(c̄ dc) = c.im d re - c.re d im
                 let mut found = re.combined(degrees * c.im / square, &im, -degrees * c.re / square);
                 found.value = -degrees * c.arg();
@@ -524,6 +524,11 @@ fn slopes(scheme: &Scheme, s: f64) -> Vec<f64> {
     (0..=m).map(|l| (0..m).map(|i| weights[i] * scheme.derivative[i * (m + 1) + l]).sum()).collect()
 }
 
+/// Sign with which an argument becomes a lag: backward whirl turns the other way.
+fn lagging(order: Order) -> f64 {
+    if order.numerator < 0 { -1.0 } else { 1.0 }
+}
+
 /// Amplitude or phase of a harmonic at a point. A harmonic that the cycle does not have is 0; an equilibrium has none but
 /// the mean.
 pub(super) fn harmonic(field: &dyn VectorField, point: &Point, term: Term) -> Option<f64> {
@@ -545,7 +550,7 @@ pub(super) fn harmonic(field: &dyn VectorField, point: &Point, term: Term) -> Op
         Signal::Channel(own) => (channel(own), 2.0),
         Signal::Pair(u, v) => (channel(u) + Complex64::I * channel(v), 1.0),
     };
-    let found = if amplitude { both * c.norm() } else { -c.arg() * 360.0 / TAU };
+    let found = if amplitude { both * c.norm() } else { -lagging(order) * c.arg() * 360.0 / TAU };
     // -180° and 180° are one angle.
     Some(if amplitude { found } else { wrapped(found) })
 }

@@ -6,7 +6,7 @@
 //! ```text
 //!   (1)  c_k = (1/T) ∫ g e^(-ikωt) dt
 //!   (2)  state or output:  g = c_0 + Σ_{k>0} a_k cos(kωt - φ_k),   a_k = 2 |c_k|,  φ_k = -arg c_k
-//!   (3)  pair:             g = Σ_k a_k e^(i(kωt - φ_k)),           a_k = |c_k|,    φ_k = -arg c_k
+//!   (3)  pair:             g = Σ_k a_k e^(±i(|k|ωt - φ_k)),        a_k = |c_k|,    φ_k = ∓arg c_k    (± the sign of k)
 //! ```
 //!
 //! The order k is a fraction for subharmonics of the forcing: a cycle of two forcing periods has harmonics of order 1/2.
