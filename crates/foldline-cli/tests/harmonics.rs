@@ -195,7 +195,7 @@ fn a_doubled_cycle_has_a_harmonic_of_order_one_half() {
     // A pendulum whose pivot shakes at twice its frequency: the doubled cycle moves at half the forcing frequency.
     let model = "name = \"parametric\"\n[parameters]\nOmega = 2\ne = 0.3\n[forcing]\nfrequency = \"Omega\"\n[states]\n\
         x = \"v\"\nv = \"-0.1*v - (1 + e*cos(Omega*t))*x - x^3\"\n";
-    let study = "[[seed]]\nname = \"s\"\nattractor = { periods = 2 }\nsamples = 8\n\
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 2\nsamples = 8\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [1.9, 2.3]\n";
     let (model, diagram) = run(model, study);
     for point in &branch(&diagram, "b").points {

@@ -314,3 +314,108 @@ fn mistakes_have_place_cause_and_cure() {
     let text: String = parse_study(study, "study", CIRCLE, "model").unwrap_err().iter().map(|one| one.to_string()).collect();
     assert!(text.contains("the phase of a cycle is arbitrary") && text.contains("x_h1_phase-y_h1_phase"), "{text}");
 }
+
+/// A folder with a model and a study of a held branch, and the command.
+struct Desk(tempfile::TempDir);
+
+impl Desk {
+    fn new() -> Desk {
+        let desk = Desk(tempfile::tempdir().unwrap());
+        std::fs::write(desk.0.path().join("m.toml"), OSCILLATOR).unwrap();
+        let held = "peaks = [\"x_h1\"]\n[[branch]]\nname = \"h\"\nfrom = \"b\"\nfree = [\"Omega\", \"F\"]\nhold = { x_max = 0.8 }\nrange = [0.3, 2]\n";
+        let record = "record = [\"x_h1\", \"x_h1_phase\", \"x_h1/v_h1_dB\", \"x+iv_h-1\"]";
+        std::fs::write(desk.0.path().join("s.toml"), format!("model = \"m.toml\"\n{record}\n{FORCED}{held}")).unwrap();
+        desk
+    }
+
+    /// Runs the command and returns its standard output.
+    #[track_caller]
+    fn run(&self, arguments: &str) -> String {
+        let command = std::process::Command::new(env!("CARGO_BIN_EXE_foldline"))
+            .args(arguments.split(' '))
+            .current_dir(self.0.path())
+            .output()
+            .unwrap();
+        assert!(command.status.success(), "{arguments}: {}", String::from_utf8_lossy(&command.stderr));
+        String::from_utf8(command.stdout).unwrap()
+    }
+
+    /// Column of a table in comma-separated values.
+    fn column(text: &str, name: &str) -> Vec<f64> {
+        let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+        let head: Vec<&str> = lines.next().unwrap().split(',').map(|cell| cell.trim_matches('"')).collect();
+        let at = head.iter().position(|own| *own == name).unwrap_or_else(|| panic!("no {name} in {head:?}"));
+        lines.map(|line| line.split(',').nth(at).unwrap().parse().unwrap_or(f64::NAN)).collect()
+    }
+}
+
+#[test]
+fn recorded_quantities_are_columns_of_tables_and_exports_and_axes_of_pictures() {
+    let desk = Desk::new();
+    desk.run("run s.toml --out r");
+    let table = desk.run("table r --points --branch b --format csv");
+    desk.run("export r --format csv --out e --no-profiles");
+    desk.run("export r --format netcdf --out e.nc --no-profiles");
+    let exported = std::fs::read_to_string(desk.0.path().join("e/points.csv")).unwrap();
+    let count = Desk::column(&table, "Omega").len();
+    for (text, ratio, pair) in
+        [(&table, "x_h1/v_h1_dB", "x+iv_h-1"), (&exported, "x_h1_over_v_h1_dB", "x_plus_iv_h_minus_1")]
+    {
+        let [omega, x, phase, decibels, backward] =
+            ["Omega", "x_h1", "x_h1_phase", ratio, pair].map(|name| Desk::column(text, name));
+        for k in 0..count {
+            let (re, im) = (1.0 - omega[k] * omega[k], 0.2 * omega[k]);
+            assert!((x[k] * re.hypot(im) / 0.3 - 1.0).abs() < 1e-6 && (phase[k] - im.atan2(re).to_degrees()).abs() < 1e-4);
+            assert!((decibels[k] + 20.0 * omega[k].log10()).abs() < 1e-5, "{}", decibels[k]);
+            // x + i x' of a harmonic motion has the backward part a |1 - Ω|/2.
+            assert!((backward[k] - 0.5 * x[k] * (1.0 + omega[k])).abs().min((backward[k] - 0.5 * x[k] * (1.0 - omega[k]).abs()).abs()) < 1e-6);
+        }
+    }
+    let special = desk.run("table r --format csv");
+    assert!(Desk::column(&special, "x_h1")[0].is_finite());
+    for axes in ["--x Omega --y x_h1_phase", "--x F --y x_h1/v_h1_dB", "--y v_h1"] {
+        desk.run(&format!("plot r {axes} -o p.svg"));
+        let picture = std::fs::read_to_string(desk.0.path().join("p.svg")).unwrap();
+        assert!(picture.contains("<path") || picture.contains("<polyline"), "{axes}");
+    }
+}
+
+#[test]
+fn a_stored_branch_knows_what_it_holds_and_is_verified() {
+    let desk = Desk::new();
+    desk.run("run s.toml --out r");
+    let branches = desk.run("table r --branches");
+    assert!(branches.contains("x_max = 0.8"), "{branches}");
+    let run = foldline_store::run_file::load(&desk.0.path().join("r")).unwrap();
+    let own = run.diagram.branch("h").unwrap();
+    assert_eq!((own.also.len(), own.also[0].0, &own.levels[..]), (1, 1, &[("x_max".to_string(), 0.8)][..]));
+    let plain = run.diagram.branch("b").unwrap();
+    assert!(plain.also.is_empty() && plain.levels.is_empty());
+    let checked = desk.run("verify r");
+    assert!(!checked.contains("did not converge") && !checked.contains("another solution"), "{checked}");
+    assert!(checked.lines().any(|line| line.starts_with("profile") && line.contains("100.0 %")), "{checked}");
+}
+
+#[test]
+fn an_interrupted_branch_with_held_quantities_is_resumed() {
+    struct Enough(std::sync::atomic::AtomicUsize);
+    impl foldline::contract::Observer for Enough {
+        fn observe(&self, event: foldline::contract::Event) -> foldline::contract::Verdict {
+            let own = matches!(event, foldline::contract::Event::Point(branch, _) if branch.name == "h");
+            let count = self.0.fetch_add(usize::from(own), std::sync::atomic::Ordering::SeqCst);
+            if own && count >= 4 { foldline::contract::Verdict::Stop } else { foldline::contract::Verdict::Continue }
+        }
+    }
+    let held = "[[branch]]\nname = \"h\"\nfrom = \"b\"\nfree = [\"Omega\", \"F\"]\nhold = { x_max = 0.8 }\nrange = [0.3, 2]\n";
+    let study = parse_study(&format!("model = \"m\"\n{FORCED}{held}"), "study", OSCILLATOR, "model").unwrap();
+    let system = System::of_plan(&study.model, &study.plan);
+    let whole = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    let part = explore::run(&system, &study.plan, 1, Diagram::default(), &Enough(Default::default()));
+    assert!(part.branch("h").unwrap().points.len() < whole.branch("h").unwrap().points.len());
+    let rest = explore::run(&system, &study.plan, 1, part, &Unobserved);
+    let [a, b] = [&whole, &rest].map(|diagram| branch(diagram, "h"));
+    assert_eq!((a.points.len(), ended(b)), (b.points.len(), ["bound", "bound"]));
+    for (a, b) in a.points.iter().zip(&b.points) {
+        assert!((a.parameters[1] - b.parameters[1]).abs() < 1e-7);
+    }
+}

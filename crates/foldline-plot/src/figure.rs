@@ -270,7 +270,8 @@ impl Marker {
             Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
             Kind::Grazing | Kind::BoundaryEquilibrium => Marker::Nabla,
             Kind::Sliding => Marker::Plus,
-            Kind::Mark | Kind::Peak => Marker::Dot,
+            Kind::Peak => Marker::Nabla,
+            Kind::Mark => Marker::Dot,
             Kind::Unexplained => Marker::Star,
         }
     }

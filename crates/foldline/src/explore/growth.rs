@@ -717,6 +717,14 @@ impl Growth<'_> {
         }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };
+        let alone;
+        let special = match system.holds {
+            None => special,
+            Some(_) => {
+                alone = self.alone(system, branch, special);
+                &alone
+            }
+        };
         match &special.point.solution {
             Solution::Equilibrium(there) => {
                 let mut at = special.point.clone();
@@ -768,7 +776,17 @@ impl Growth<'_> {
         let near = beside.min_by_key(|point| (point.position - special.point.position).abs());
         let (Some(here), Some(there)) = (value(&special.point), near.and_then(value)) else { return String::new() };
         let name = mark.quantity.name(&self.system.channel_names);
-        format!("{} {name} = {}", if here > there { "largest" } else { "smallest" }, Shown(here))
+        format!("{} {name} = {}", if here > there { "largest" } else { "smallest" }, significant(here))
+    }
+
+    /// A special point of a branch with held quantities as one of a branch in the continuation parameter alone.
+    fn alone(&self, system: &System, branch: &Branch, special: &SpecialPoint) -> SpecialPoint {
+        let alone = System { holds: None, ..system.clone() };
+        let mut problem = problem_of(&alone, branch.free, self.degree, &special.point, false);
+        let u = problem.unknowns_of(&special.point);
+        problem.anchor(&u);
+        let tangent = direction(&mut *problem, &u).unwrap_or_default();
+        SpecialPoint { point: Point { tangent, ..special.point.clone() }, ..special.clone() }
     }
 
     /// Tells folds from branch points where quantities are held: at a fold the solutions at fixed further parameters turn
@@ -800,6 +818,15 @@ impl Growth<'_> {
         };
         branch.ends[side] = Some(ending.clone());
         self.tell(Event::SideEnded(branch, side, &ending))
+    }
+}
+
+/// A number with eight significant digits.
+fn significant(value: f64) -> String {
+    let size = value.abs().log10().floor();
+    match (-4.0..8.0).contains(&size) {
+        true => format!("{value:.*}", (7.0 - size) as usize),
+        false => format!("{value:.7e}"),
     }
 }
 
