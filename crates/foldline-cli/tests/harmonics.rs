@@ -116,7 +116,10 @@ fn an_antiresonance_is_a_smallest_value() {
     // Two masses; the first stands still where the second absorbs, at Ω² = k/m = 4, without damping of the absorber nearly.
     let model = "name = \"absorber\"\n[parameters]\nOmega = 0.5\n[forcing]\nfrequency = \"Omega\"\n[states]\nx = \"v\"\n\
         v = \"-x - 0.02*v - 0.4*(x - y) + cos(Omega*t)\"\ny = \"w\"\nw = \"-4*(y - x) - 0.002*(w - v)\"\n";
-    let (_, diagram) = run(model, &format!("{FORCED}range = [1.5, 2.3]\n").replace("samples = 4", "parameters = { Omega = 1.5 }\nsamples = 4"));
+    let (_, diagram) = run(
+        model,
+        &format!("{FORCED}range = [1.5, 2.3]\n").replace("samples = 4", "parameters = { Omega = 1.5 }\nsamples = 4"),
+    );
     assert!(branch(&diagram, "b").special.is_empty());
     let study = format!("{FORCED}range = [1.5, 2.3]\npeaks = \"x_h1\"\n");
     let (_, diagram) = run(model, &study.replace("samples = 4", "parameters = { Omega = 1.5 }\nsamples = 4"));

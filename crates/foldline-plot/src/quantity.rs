@@ -18,7 +18,8 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     parameter.or_else(bare).or_else(|| Quantity::named(name, model)).ok_or_else(|| {
         let parameters = model.parameters.iter().map(|p| p.name.as_str());
         let variables = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-        let names: Vec<&str> = parameters.chain(variables.map(String::as_str)).chain(["period", "frequency", "norm"]).collect();
+        let names: Vec<&str> =
+            parameters.chain(variables.map(String::as_str)).chain(["period", "frequency", "norm"]).collect();
         format!(
             "one of: {}; or a state or output followed by _max, _min, _mean, _rms, _integral, _h1 or _h1_phase",
             names.join(", ")

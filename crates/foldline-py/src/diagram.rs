@@ -7,8 +7,8 @@ use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::VectorField;
 use foldline::converted::Conversion;
-use foldline::special::quantity::Quantity;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
+use foldline::special::quantity::Quantity;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::load;
 use foldline_store::short;
@@ -147,7 +147,12 @@ impl Diagram {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
         let diagram = diagram::Diagram { branches: vec![branch], ..diagram::Diagram::default() };
-        Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new(), converted: self.converted })
+        Ok(Diagram {
+            diagram: Arc::new(diagram),
+            study: Arc::clone(&self.study),
+            notes: Vec::new(),
+            converted: self.converted,
+        })
     }
 
     /// Solution at the target of a homotopy.

@@ -187,8 +187,13 @@ fn origin(origin: &Origin) -> String {
 /// Columns of the parameters. Those that vary along a branch are shown even if there is only one row.
 fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
     let shown = || diagram.branches.iter().filter(|b| kept(b));
-    let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index)
-            || b.also.iter().any(|(other, _)| *other == index));
+    let varies = |index: usize| {
+        shown().any(|b| {
+            b.free == index
+                || b.held.is_some_and(|(_, follows)| follows == index)
+                || b.also.iter().any(|(other, _)| *other == index)
+        })
+    };
     let style = |index: usize| if varies(index) { Style::Number } else { Style::Varying };
     model.parameters.iter().enumerate().map(|(index, p)| Column::in_unit(&p.name, style(index), &p.unit)).collect()
 }

@@ -147,7 +147,8 @@ impl Variables {
         let states = model.states.iter();
         let states = states.map(|s| labelled(&s.name, &s.unit, described(&s.name, &s.description))).collect();
         // Names in files of arrays are letters, digits and underscores.
-        let plain = |name: &str| name.replace('/', "_over_").replace('-', "_minus_").replace('+', "_plus_").replace(' ', "");
+        let plain =
+            |name: &str| name.replace('/', "_over_").replace('-', "_minus_").replace('+', "_plus_").replace(' ', "");
         let own = |(name, quantity): &(String, Quantity)| labelled(&plain(name), quantity.unit(model), name.clone());
         let recorded = record.iter().map(own).collect();
         Variables { parameters, turns, ranges, averages, states, recorded, time: model.time.clone() }

@@ -212,7 +212,8 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         let number: i64 = row.get("branch").map_err(|e| e.to_string())?;
         Ok((number, branch_in(row)?))
     })?;
-    let held = read(connection, path, "SELECT name FROM sqlite_master WHERE name = 'held_quantities'", &[], |_| Ok(()))?;
+    let held =
+        read(connection, path, "SELECT name FROM sqlite_master WHERE name = 'held_quantities'", &[], |_| Ok(()))?;
     for (number, mut branch) in branches {
         if !held.is_empty() {
             let sql = "SELECT parameter, name, value_bytes FROM held_quantities WHERE branch = ?1 ORDER BY rowid";

@@ -1,8 +1,8 @@
 //! Writer of a run in progress.
 
+use super::bytes::pack;
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
-use super::bytes::pack;
 use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};

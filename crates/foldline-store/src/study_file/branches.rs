@@ -5,10 +5,10 @@ use super::items::{Ground, Item, Known, max_points, origin};
 use super::unknown_parameter;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
-use foldline::diagram::{Kind, Shown};
 use foldline::contract::VectorField;
-use foldline::explore::{BranchPlan, Start, Switching};
+use foldline::diagram::{Kind, Shown};
 use foldline::explore::plan::Holds;
+use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::{Model, Parameter, unsupported};
 use foldline::special::mark::Mark;
 use foldline::special::quantity::Quantity;
@@ -52,7 +52,9 @@ pub(super) fn read(
         Some(held) => held.as_ref().map(|held| held.free),
         None => free(walk, item, ground.model),
     };
-    if held.is_none() && let Some(value) = table.get("near") {
+    if held.is_none()
+        && let Some(value) = table.get("near")
+    {
         walk.report(value.span(), "`near` selects the start of a branch with `hold`", "remove it, or add `hold`");
     }
     let switching = table.get("switch").map(|value| switching(walk, value)).unwrap_or_default();

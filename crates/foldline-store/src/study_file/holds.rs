@@ -11,7 +11,7 @@ use foldline::model::{Model, Parameter};
 use foldline::special::on_levels::Level;
 use foldline::special::quantity::Quantity;
 
-/// What a branch with held quantities says.
+/// Parameters and held quantities of a branch.
 pub(super) struct Held {
     /// The continuation parameter, the first of `free`.
     pub(super) free: usize,
@@ -25,7 +25,8 @@ pub(super) fn read(walk: &mut Walk, item: &Item, model: &Model) -> Option<Held> 
     let levels = levels(walk, item, model);
     if let Some(value) = table.get("switch") {
         let message = "branches are not switched where quantities are held";
-        let right = "remove `switch`; start an ordinary branch from this one, with one free parameter and without `hold`";
+        let right =
+            "remove `switch`; start an ordinary branch from this one, with one free parameter and without `hold`";
         walk.report(value.span(), message, right);
     }
     let (frees, levels) = (frees?, levels?);
@@ -38,8 +39,15 @@ pub(super) fn read(walk: &mut Walk, item: &Item, model: &Model) -> Option<Held> 
         );
         let at = table.get("free").map_or(item.span.clone(), |value| value.span());
         let right = match levels.len() + 1 > frees.len() {
-            true => format!("{} in `free`, such as `free = [{}]`", count(levels.len() + 1, "parameter"), example(model, &frees, levels.len() + 1)),
-            false => format!("{} in `hold`, or fewer parameters", count(frees.len() - 1, "quantity").replace("quantitys", "quantities")),
+            true => format!(
+                "{} in `free`, such as `free = [{}]`",
+                count(levels.len() + 1, "parameter"),
+                example(model, &frees, levels.len() + 1)
+            ),
+            false => format!(
+                "{} in `hold`, or fewer parameters",
+                count(frees.len() - 1, "quantity").replace("quantitys", "quantities")
+            ),
         };
         walk.report(at, message, right);
         return None;
@@ -48,7 +56,11 @@ pub(super) fn read(walk: &mut Walk, item: &Item, model: &Model) -> Option<Held> 
         if let Quantity::Parameter(index) = level.quantity {
             let at = table.get("hold").map_or(item.span.clone(), |value| value.span());
             let name = &model.parameters[index].name;
-            walk.report(at, format!("{name} is a parameter, and a parameter that is not free is held anyway"), format!("remove {name} from `hold` and from `free`"));
+            walk.report(
+                at,
+                format!("{name} is a parameter, and a parameter that is not free is held anyway"),
+                format!("remove {name} from `hold` and from `free`"),
+            );
             return None;
         }
     }
@@ -113,7 +125,8 @@ fn levels(walk: &mut Walk, item: &Item, model: &Model) -> Option<Vec<Level>> {
         for (key, value) in table.iter() {
             let name: &str = key.get_ref();
             let Some(quantity) = held_quantity(walk, name, key.span(), model) else { continue };
-            if let Some(value) = walk.quantity(value, &format!("the value of `{name}`"), reading_unit(quantity, model)) {
+            if let Some(value) = walk.quantity(value, &format!("the value of `{name}`"), reading_unit(quantity, model))
+            {
                 found.push(level(quantity, value, name));
             }
         }
@@ -168,7 +181,11 @@ pub(super) fn bounds(
     let target = target?;
     if target < limits[0] || target > limits[1] {
         let [low, high] = limits.map(Shown);
-        walk.report(at, format!("the target {} is outside the range from {low} to {high}", Shown(target)), "a value within the range");
+        walk.report(
+            at,
+            format!("the target {} is outside the range from {low} to {high}", Shown(target)),
+            "a value within the range",
+        );
     }
     Some((limits, Some(target)))
 }
@@ -182,7 +199,11 @@ pub(super) fn others(walk: &mut Walk, item: &Item, held: &mut Held, model: &Mode
             Some(index) if index == held.free => {}
             Some(index) => match held.holds.others.iter_mut().find(|(other, _)| *other == index) {
                 Some((_, limits)) => *limits = range(walk, value, &model.parameters[index].unit),
-                None => walk.report(key.span(), format!("{name} has a range, but is not free"), format!("add {name} to `free`, or remove its range")),
+                None => walk.report(
+                    key.span(),
+                    format!("{name} has a range, but is not free"),
+                    format!("add {name} to `free`, or remove its range"),
+                ),
             },
             None => unknown_parameter(walk, key.span(), name, model),
         }
@@ -192,13 +213,12 @@ pub(super) fn others(walk: &mut Walk, item: &Item, held: &mut Held, model: &Mode
 /// Reports quantities that the solutions of the branch do not have.
 pub(super) fn fits(walk: &mut Walk, item: &Item, held: &Held, start: &Start, family: Option<Family>, ground: &Ground) {
     let at = || item.table.get("hold").map_or(item.span.clone(), |value| value.span());
-    let plain = |name: &str| {
-        ground.model.state_index(name).is_some() || ground.model.output_index(name).is_some()
-    };
+    let plain = |name: &str| ground.model.state_index(name).is_some() || ground.model.output_index(name).is_some();
     for level in &held.holds.levels {
         let name = &level.name;
         if family == Some(Family::Cycle) && plain(name) {
-            let right = format!("`{name}_max`, `{name}_min`, `{name}_mean`, `{name}_rms` or a harmonic such as `{name}_h1`");
+            let right =
+                format!("`{name}_max`, `{name}_min`, `{name}_mean`, `{name}_rms` or a harmonic such as `{name}_h1`");
             walk.report(at(), format!("{name} varies along a cycle"), right);
         }
         let periodic = matches!(level.quantity, Quantity::Period | Quantity::Frequency | Quantity::Integral(_))

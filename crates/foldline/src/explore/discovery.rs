@@ -98,7 +98,7 @@ impl Discovery<'_, '_> {
         self.named.push(kind.clone());
         let number = self.named.iter().filter(|other| **other == kind).count();
         let branch = BranchPlan {
-holds: Default::default(),
+            holds: Default::default(),
             name: format!("{}/{kind}-{number}", plan.name),
             start: Start::Seed(0),
             free: plan.free,

@@ -185,8 +185,7 @@ impl Work<'_> {
             let parent = self.branches.iter().find(|branch| branch.name == name);
             let held = parent.and_then(|parent| holds::on_branch(self.system, &plan.branches[i], parent, &point));
             self.planned(i, origin(), held.unwrap_or_else(|| point.clone()))
-        })
-            && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
+        }) && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
     }
 
     /// Follows a homotopy, and everything that starts at its goal.
@@ -239,7 +238,8 @@ impl Work<'_> {
             }
         };
         if let Some(earlier) = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty()) {
-            let (settings, sides) = bounded(self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?));
+            let (settings, sides) =
+                bounded(self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?));
             let mut holds = plan.holds.clone();
             holds.levels.iter_mut().zip(&earlier.levels).for_each(|(level, (_, value))| level.value = *value);
             let mut branch = earlier.clone();

@@ -1,8 +1,8 @@
 //! Continuation of one branch to both sides, from its start or from the end of an earlier run.
 
 use super::counted::Counted;
-use super::symmetry::{is_rotating_wave, rotation};
 use super::plan::Holds;
+use super::symmetry::{is_rotating_wave, rotation};
 use super::{System, corner};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
@@ -17,8 +17,8 @@ use crate::special::connection::Limits;
 use crate::special::mark::Mark;
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
-use crate::special::quantity::Quantity;
 use crate::special::peak::Peak;
+use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse, grazing, sliding};
 use std::cell::RefCell;
@@ -74,9 +74,7 @@ impl Line {
             _ if system.field.iterated() => {
                 (point.solution.clone(), Box::new(MapProblem::like(setting.clone(), &point.solution)))
             }
-            Solution::Equilibrium(_) => {
-                (point.solution.clone(), Box::new(EquilibriumProblem::new(setting.clone())))
-            }
+            Solution::Equilibrium(_) => (point.solution.clone(), Box::new(EquilibriumProblem::new(setting.clone()))),
             Solution::Cycle(cycle) => {
                 let cycle = mesh::at_least_some(cycle, degree);
                 let problem = Box::new(CycleProblem::like(setting.clone(), &cycle));
@@ -564,7 +562,8 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
-        let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && system.field.switch_count() > 0);
+        let (free, corners) =
+            (branch.free, branch.held.is_none() && system.holds.is_none() && system.field.switch_count() > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let mut walk = Follow {
             problem: &mut *problem,

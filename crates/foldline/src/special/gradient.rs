@@ -200,8 +200,13 @@ impl<'a> Along<'a> {
         let (own, count) = (channel - n, self.field.output_count());
         let free: Vec<usize> = (0..k).collect();
         let [mut g, mut gx, mut gp, mut gt] = [1, n, k, 1].map(|size| vec![0.0; count * size * lanes]);
-        let batch =
-            Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters), times: &times, signs: &[] };
+        let batch = Batch {
+            lanes,
+            states: &states,
+            parameters: Parameters::Shared(self.parameters),
+            times: &times,
+            signs: &[],
+        };
         if own >= count || !self.field.linearise_outputs(batch, &free, [&mut g, &mut gx, &mut gp, &mut gt]) {
             return None;
         }
@@ -238,7 +243,12 @@ impl<'a> Along<'a> {
     fn coefficient(&self, signal: Signal, k: i64) -> Option<[Gradient; 2]> {
         let samples = self.gauss(k as f64);
         let turned = |part: fn(f64) -> f64, sign: f64| -> Vec<f64> {
-            samples.times.iter().zip(&samples.weights).map(|(t, w)| sign * w * part(TAU * (k as f64 * t).fract())).collect()
+            samples
+                .times
+                .iter()
+                .zip(&samples.weights)
+                .map(|(t, w)| sign * w * part(TAU * (k as f64 * t).fract()))
+                .collect()
         };
         let (cosines, sines) = (turned(f64::cos, 1.0), turned(f64::sin, -1.0));
         let plain = |value: f64| [value, 1.0];
@@ -263,7 +273,8 @@ impl<'a> Along<'a> {
         if count == 0 || cycle.profile.is_empty() {
             return Vec::new();
         }
-        let mut samples = Samples { times: vec![], starts: vec![], basis: vec![], nodes: cycle.degree + 1, weights: vec![] };
+        let mut samples =
+            Samples { times: vec![], starts: vec![], basis: vec![], nodes: cycle.degree + 1, weights: vec![] };
         if cycle.degree == 0 {
             samples = self.gauss(0.0);
             let values = self.values(channel, &samples);

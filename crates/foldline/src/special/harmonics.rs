@@ -44,7 +44,7 @@ impl Order {
     }
 }
 
-/// What is measured of a signal.
+/// Measure of a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measured {
     /// Largest value.
@@ -85,7 +85,7 @@ impl Signal {
 pub struct Term {
     /// The signal.
     pub signal: Signal,
-    /// What is measured of it.
+    /// Its measure.
     pub measured: Measured,
 }
 

@@ -197,12 +197,7 @@ pub struct Corner<'a> {
 
 impl<'a> Corner<'a> {
     /// Monitors of held extrema. `tolerance` is the relative accuracy of solutions.
-    pub fn all(
-        field: &'a dyn VectorField,
-        levels: &[Level],
-        sizes: &[f64],
-        tolerance: f64,
-    ) -> Vec<Corner<'a>> {
+    pub fn all(field: &'a dyn VectorField, levels: &[Level], sizes: &[f64], tolerance: f64) -> Vec<Corner<'a>> {
         let mut found = Vec::new();
         for (level, size) in levels.iter().zip(sizes) {
             let own = match level.quantity {

@@ -70,6 +70,11 @@ impl Part<'_> {
         Check { branch, position, special: None, parameter, quantity, stated, found }
     }
 
+    /// True if the points are solutions in several free parameters.
+    fn in_several_parameters(&self) -> bool {
+        self.branch.held.is_some() || !self.branch.also.is_empty()
+    }
+
     fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
         Undecided { branch: self.branch.name.clone(), position: point.position, special: None, why }
     }

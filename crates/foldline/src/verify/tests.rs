@@ -33,7 +33,7 @@ fn computed(model: &Model) -> Diagram {
         random: 1,
     };
     let branch = BranchPlan {
-holds: Default::default(),
+        holds: Default::default(),
         name: "rest".into(),
         start: Start::Seed(0),
         free: 0,
