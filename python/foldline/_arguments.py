@@ -149,6 +149,25 @@ def check_free(free: Any, model: Model, call: str, taken: Sequence[str] = ()) ->
     raise InputError(f"the model `{model.name}` has no parameter `{free}`\n  help: {suggestion(free, names)}")
 
 
+def check_frees(free: Any, hold: Any, start: Any) -> list[str]:
+    """Returns the free parameters of a branch with held quantities."""
+    frees = [free] if isinstance(free, str) else free
+    if not isinstance(frees, Sequence) or not frees or not all(isinstance(own, str) for own in frees):
+        raise wrong_kind("the names of the parameters that vary are needed", free, 'free=["Omega", "epsilon"]')
+    if hold is not None and (isinstance(hold, str) or not isinstance(hold, (Mapping, Sequence))):
+        raise wrong_kind("hold must be a dictionary, or a list of names", hold, 'hold={"x_max": 2.0}')
+    for index, own in enumerate(frees):
+        check_free(own, start.model, "foldline.follow(start, [{}, …], (0.5, 4), hold=…)", frees[:index])
+    return list(frees)
+
+
+def check_names(name: str, names: Any) -> None:
+    """Refuses anything but a list of names."""
+    if names is None or (isinstance(names, Sequence) and not isinstance(names, str) and all(isinstance(own, str) for own in names)):
+        return
+    raise wrong_kind(f"{name} must be a list of names", names, f'{name}=["x_max"]')
+
+
 def number(name: str, value: Any) -> float:
     """Returns a number; refuses text."""
     if isinstance(value, Real) and not isinstance(value, bool):

@@ -160,6 +160,10 @@ class Branch(Sequence[Solution]):
         Scale of that parameter, to which errors are relative.
     held : tuple or None
         For a bifurcation curve: the kind of bifurcation, and the name of the other parameter.
+    also : tuple of str
+        On a branch with held quantities: the other free parameters.
+    levels : dict
+        On a branch with held quantities: their values, by name.
     origin : tuple
         Where the branch comes from: ``("seed", name, None, None)``, ``("end", name, None, None)`` or ``("switch", parent, kind, value)``.
     ends : tuple of str
@@ -188,6 +192,8 @@ class Branch(Sequence[Solution]):
         self.scale: float = parts["scale"]
         held = parts["held"]
         self.held: tuple[str, str] | None = None if held is None else (held[0], names[held[1]])
+        self.also: tuple[str, ...] = tuple(names[index] for index in parts["also"])
+        self.levels: dict[str, float] = dict(parts["levels"])
         self.origin: tuple[str, str, str | None, float | None] = tuple(parts["origin"])
         self._count: int = parts["points"]
         self._ends: list[tuple[str, str, bool] | None] = parts["ends"]
@@ -277,6 +283,9 @@ class Branch(Sequence[Solution]):
             return integers(self._column(name))
         if name in (*TRUST, "step"):
             return floats(self._column(name))
+        values = self.diagram._native.quantity(self._index, False, name)
+        if values is not None:
+            return floats(values)
         raise KeyError(f"{name}: {suggestion(name, self.columns)}")
 
     @overload

@@ -7,13 +7,15 @@ command line, and every result can be saved as a run.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import _native
 from ._arguments import (
     call_of,
     check_free,
+    check_frees,
+    check_names,
     check_marks,
     check_model,
     check_parameters,
@@ -229,13 +231,15 @@ def open(folder: Path) -> Diagram:
 
 def follow(
     start: Solution,
-    free: str,
-    range: Range | None = None,
+    free: str | Sequence[str],
+    range: Range | Mapping[str, Range] | None = None,
     *,
+    hold: Mapping[str, Any] | Sequence[str] | None = None,
     until: float | str | None = None,
     switch: Mapping[str, int] | None = None,
     mark: Mapping[str, Any] | None = None,
     stop: Mapping[str, Any] | None = None,
+    peaks: Sequence[str] | None = None,
     max_points: int = 10_000,
     name: str | None = None,
     tolerance: float = 1e-6,
@@ -251,12 +255,16 @@ def follow(
     ----------
     start : Solution
         From `Model.settle` or `Model.attractors`, or a point of another branch. It is taken as it is, stable or not.
-    free : str
-        Name of the parameter that varies.
-    range : pair
-        Smallest and largest value of that parameter. The branch is followed from its start to both sides until it leaves the range,
+    free : str or list of str
+        Name of the parameter that varies; with `hold`, the names of one parameter more than there are held quantities. The first
+        is the continuation parameter.
+    range : pair, or mapping of pairs
+        Smallest and largest value of that parameter, or of each free parameter: ``{"Omega": (0.5, 4), "epsilon": (0, 1)}``. The branch is followed from its start to both sides until it leaves the range,
         closes on itself or joins another branch. It may be left out if `until` is given. Numbers are in the unit of the model;
         ``"500 rpm"`` carries its own.
+    hold : mapping or list of str, optional
+        Quantities that keep a value along the branch: ``{"r_max": 2.0}``, or ``["period"]`` for the value at the start. From a start
+        with another value, the further parameters are changed first.
     until : float or str, optional
         Follow only towards this value and stop there. Without `range`, the range extends from the start to this value.
     switch : mapping, optional
@@ -264,6 +272,8 @@ def follow(
         means the second Hopf point only. The branches found are in `Branch.switched` and `Branch.diagram`.
     mark, stop : mapping, optional
         Values of quantities to locate on the way, or to stop at: ``{"Omega": [4, 5], "r_max": 2}``.
+    peaks : list of str, optional
+        Quantities whose largest and smallest values along the branch are located as special points of the kind ``peak``.
     max_points : int
         Largest number of points on each side of the start.
     name : str, optional
@@ -302,17 +312,28 @@ def follow(
     >>> bool(branch["mu"].max() == 2)
     True
     """
-    check_solution(start, call_of("follow", free, range))
-    check_free(free, start.model, "foldline.follow(start, {}, (0.5, 4))")
-    missing = f"the range of `{free}` is missing" if until is None else ""
-    ends = check_range(range, f'foldline.follow(start, "{free}", {{}})', missing)
-    check_within(start, free, ends)
+    several = hold is not None or not isinstance(free, str)
+    frees: list[str] = check_frees(free, hold, start) if several else [free]  # type: ignore[list-item]
+    first = frees[0]
+    check_solution(start, call_of("follow", first, range))
+    check_free(first, start.model, "foldline.follow(start, {}, (0.5, 4))")
+    missing = f"the range of `{first}` is missing" if until is None else ""
+    call = f'foldline.follow(start, "{first}", {{}})' if not several else f"foldline.follow(start, {frees!r}, {{}}, hold={hold!r})"
+    ranges: Any = None
+    if several and isinstance(range, Mapping):
+        ranges = {own: check_range(pair, call) for own, pair in range.items()}
+        check_within(start, first, ranges.get(first))
+    else:
+        ranges = check_range(range, call, missing)  # type: ignore[arg-type]
+        check_within(start, first, ranges)
     check_switch(switch)
     check_marks("mark", mark)
     check_marks("stop", stop)
-    own = name or f"{start.family} over {free}"
-    item = {"name": own, "from": START, "free": free, "range": ends, "until": None if until is None else end("until", until),
-            "switch": switch, "mark": mark, "stop": stop, "max-points": whole("max_points", max_points)}  # fmt: skip
+    check_names("peaks", peaks)
+    own = name or f"{start.family} over {' and '.join(frees)}"
+    item = {"name": own, "from": START, "free": frees if several else first, "range": ranges, "hold": hold,
+            "until": None if until is None else end("until", until), "switch": switch, "mark": mark, "stop": stop, "peaks": peaks,
+            "max-points": whole("max_points", max_points)}  # fmt: skip
     study = study_from(start, tolerance, degree, branch=[cleaned(item)])
     return branch_of(study, start, own, out=out, jobs=jobs, resume=resume, progress=progress)
 

@@ -19,8 +19,12 @@ const SCALE: f32 = 2.0;
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let mut run = read(&typed.folder, Part::Numbers)?;
-    if run.model.iterated() || run.model.conditions() != [0, 0] {
-        // Iterates, or values at the ends of an interval, are drawn, which are part of the profiles.
+    let profiled = |name: &Option<String>| {
+        let found = name.as_ref().and_then(|name| foldline_plot::axis(name, &run.model).ok());
+        found.is_some_and(|quantity| quantity.needs_profile())
+    };
+    if run.model.iterated() || run.model.conditions() != [0, 0] || profiled(&typed.x) || profiled(&typed.y) {
+        // Iterates, values at the ends of an interval and harmonics need the profiles.
         run = read(&typed.folder, Part::Everything)?;
     }
     let Run { mut model, mut diagram, .. } = run;

@@ -270,6 +270,7 @@ impl Marker {
             Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
             Kind::Grazing | Kind::BoundaryEquilibrium => Marker::Nabla,
             Kind::Sliding => Marker::Plus,
+            Kind::Peak => Marker::Nabla,
             Kind::Mark => Marker::Dot,
             Kind::Unexplained => Marker::Star,
         }

@@ -7,7 +7,7 @@ use crate::quantity::{default_x, default_y, label};
 use crate::responses::response_layers;
 use foldline::diagram::Diagram;
 use foldline::model::Model;
-use foldline::special::quantity::Quantity;
+use foldline::special::quantity::{Quantity, append, appended};
 
 /// Contents and size of a picture.
 #[derive(Clone, Debug)]
@@ -30,11 +30,29 @@ impl Default for Picture {
     }
 }
 
+/// The diagram with the values of quantities that need the profiles of its points, and those quantities of its points; the
+/// diagram itself, `None`, if there are none.
+fn with_values(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> (Option<Diagram>, [Quantity; 2]) {
+    if !axes.iter().any(|axis| axis.needs_profile()) {
+        return (None, axes);
+    }
+    let mut diagram = diagram.clone();
+    for branch in &mut diagram.branches {
+        let special = branch.special.iter_mut().map(|special| &mut special.point);
+        branch.points.iter_mut().chain(special).for_each(|point| append(point, &axes, model));
+    }
+    (Some(diagram), [0, 1].map(|k| if axes[k].needs_profile() { appended(k, model) } else { axes[k] }))
+}
+
 /// Renders a diagram as SVG.
 pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
     let x = picture.x.unwrap_or_else(|| default_x(diagram));
     let y = picture.y.unwrap_or_else(|| default_y(model));
     let axis = |quantity: Quantity, range: Option<[f64; 2]>| Axis { range, ..Axis::new(label(quantity, model)) };
+    let (horizontal, vertical) = (axis(x, None).label, axis(y, None).label);
+    let (extended, [x, y]) = with_values(diagram, model, [x, y]);
+    let diagram = extended.as_ref().unwrap_or(diagram);
+    let axis = |label: &str, range: Option<[f64; 2]>| Axis { range, ..Axis::new(label) };
     let [wide, high] = picture.window.map_or([None, None], |[x0, x1, y0, y1]| [Some([x0, x1]), Some([y0, y1])]);
     let [width, height] = picture.size;
     let title = if picture.title.is_some() { 31.0 } else { 0.0 };
@@ -50,7 +68,7 @@ pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
         layers,
         legend: LegendPlace::Beside,
         height: height - 28.0 - title,
-        ..Panel::new("", "", axis(x, wide), axis(y, high))
+        ..Panel::new("", "", axis(&horizontal, wide), axis(&vertical, high))
     };
     figure_svg(&Figure { title: picture.title.clone(), panels: vec![panel], width, ..Figure::default() })
 }

@@ -18,8 +18,12 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     parameter.or_else(bare).or_else(|| Quantity::named(name, model)).ok_or_else(|| {
         let parameters = model.parameters.iter().map(|p| p.name.as_str());
         let variables = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-        let names: Vec<&str> = parameters.chain(variables.map(String::as_str)).chain(["period", "norm"]).collect();
-        format!("one of: {}; or a state or output followed by _max, _min, _mean, _rms or _integral", names.join(", "))
+        let names: Vec<&str> =
+            parameters.chain(variables.map(String::as_str)).chain(["period", "frequency", "norm"]).collect();
+        format!(
+            "one of: {}; or a state or output followed by _max, _min, _mean, _rms, _integral, _h1 or _h1_phase",
+            names.join(", ")
+        )
     })
 }
 
@@ -82,6 +86,14 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
         Quantity::Rms(index) => (variable(index).unwrap_or_default(), "rms "),
         // Its unit, that of the variable times time, has no name.
         Quantity::Integral(index) => ((variable(index).unwrap_or_default().0, ""), "integral of "),
+        Quantity::Frequency => (("frequency", ""), ""),
+        other => {
+            let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
+            let name = other.name(&names.cloned().collect::<Vec<String>>());
+            let unit = other.unit(model);
+            let unit = if matches!(unit, "" | "1" | "-") { String::new() } else { format!(" [{unit}]") };
+            return format!("{name}{unit}");
+        }
     };
     let unit = if matches!(unit, "" | "1" | "-") { String::new() } else { format!(" [{unit}]") };
     format!("{front}{}{unit}", with_greek(name))

@@ -32,7 +32,8 @@ pub fn value(quantity: Quantity, response: &Response) -> Option<f64> {
             let width = response.ranges.len();
             response.iterates.get(number * width + k).copied()
         }
-        Quantity::Mean(_) | Quantity::Rms(_) | Quantity::Integral(_) | Quantity::Norm(_) => None,
+        Quantity::Frequency => response.period.map(|period| 1.0 / period),
+        _ => None,
     };
     found.filter(|value| value.is_finite())
 }

@@ -8,6 +8,7 @@ use crate::study::Study;
 use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
+use foldline::special::quantity::Quantity;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::load;
 use foldline_store::short;
@@ -25,13 +26,15 @@ pub struct Diagram {
     /// Subject of each remark, and the remark.
     #[pyo3(get)]
     pub notes: Vec<(String, String)>,
+    /// True if some quantities are in other units than those of the model.
+    pub converted: bool,
 }
 
 impl Diagram {
     /// Returns the diagram with its branches in the order of the study.
     pub fn new(diagram: diagram::Diagram, study: Arc<study_file::Study>, notes: Vec<(String, String)>) -> Diagram {
         let diagram = Arc::new(ordered(diagram, &names(&study.plan)));
-        Diagram { diagram, study, notes }
+        Diagram { diagram, study, notes, converted: false }
     }
 
     /// Branch with that index.
@@ -70,7 +73,7 @@ impl Diagram {
         let conversion = Conversion::new(&self.study.model, &units).map_err(refused)?;
         let diagram = Arc::new(conversion.diagram((*self.diagram).clone()));
         let study = study_file::Study { model: conversion.model().clone(), ..(*self.study).clone() };
-        Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone() })
+        Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone(), converted: true })
     }
 
     /// Unreached parts of the study.
@@ -91,6 +94,30 @@ impl Diagram {
             false => branch.points.iter().collect(),
         };
         column(py, &points, branch, special, name)
+    }
+
+    /// Values of a quantity at the points or special points of a branch, NaN where it has none; `None` if there is no
+    /// quantity of that name.
+    fn quantity<'py>(
+        &self,
+        py: Python<'py>,
+        branch: usize,
+        special: bool,
+        name: &str,
+    ) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        let model = &self.study.model;
+        let Some(quantity) = Quantity::named(name, model) else { return Ok(None) };
+        if self.converted && quantity.needs_profile() {
+            let message = format!("`{name}` is computed in the units of the model");
+            return Err(failure::of_argument(py, message, "take it from the diagram without other units".into()));
+        }
+        let branch = self.branch(py, branch)?;
+        let value = |point: &Point| quantity.on(point, model).unwrap_or(f64::NAN);
+        let values: Vec<f64> = match special {
+            true => branch.special.iter().map(|s| value(&s.point)).collect(),
+            false => branch.points.iter().map(value).collect(),
+        };
+        numbers(py, values.into_iter()).map(Some)
     }
 
     /// Kind, unstable before and after, error, coefficients, their errors, criticality and normal form of each special
@@ -120,7 +147,12 @@ impl Diagram {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
         let diagram = diagram::Diagram { branches: vec![branch], ..diagram::Diagram::default() };
-        Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new() })
+        Ok(Diagram {
+            diagram: Arc::new(diagram),
+            study: Arc::clone(&self.study),
+            notes: Vec::new(),
+            converted: self.converted,
+        })
     }
 
     /// Solution at the target of a homotopy.
@@ -147,6 +179,8 @@ fn described<'py>(py: Python<'py>, branch: &Branch) -> PyResult<Bound<'py, PyDic
     parts.set_item("family", branch.family.name())?;
     parts.set_item("free", branch.free)?;
     parts.set_item("scale", branch.units[1])?;
+    parts.set_item("also", branch.also.iter().map(|(index, _)| *index).collect::<Vec<_>>())?;
+    parts.set_item("levels", branch.levels.clone())?;
     parts.set_item("held", branch.held.map(|(kind, first)| (kind.name(), first)))?;
     let (word, from, kind, parameter) = match &branch.origin {
         Origin::Seed(name) => ("seed", name, None, None),

@@ -22,7 +22,8 @@ pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, S
 
 fn branch_told(tell: &dyn Fn(Event), branch: &Branch) {
     let empty = Branch::new(&branch.name, branch.family, branch.free, branch.origin.clone());
-    tell(Event::Begin(&Branch { held: branch.held, units: branch.units, ..empty }));
+    let (also, levels) = (branch.also.clone(), branch.levels.clone());
+    tell(Event::Begin(&Branch { held: branch.held, also, levels, units: branch.units, ..empty }));
     branch.points.iter().for_each(|point| tell(Event::Point(branch, point)));
     branch.special.iter().for_each(|special| tell(Event::Special(branch, special)));
     for (side, ending) in branch.ends.iter().enumerate() {

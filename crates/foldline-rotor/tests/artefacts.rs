@@ -26,6 +26,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         random: 1,
     };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "S".into(),
         start: Start::Seed(0),
         free: 0,
@@ -47,6 +48,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        record: Vec::new(),
     };
     let system = System::new(&field);
     let diagram = explore::run(&system, &plan, 1, Diagram::default(), &Unobserved);

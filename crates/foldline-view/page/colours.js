@@ -14,6 +14,7 @@ const KINDS = {
   "boundary-equilibrium": ["plus", "#7a5cc0", "BE"],
   sliding: ["cross", "#a0522d", "SL"],
   "mark": ["ring", "#808890", "M"],
+  "peak": ["ring", "#303840", "P"],
   "unexplained": ["down", "#c00000", "?"],
   "cusp": ["down", "#cc79a7", "CP"],
   "bogdanov-takens": ["pentagon", "#e69f00", "BT"],

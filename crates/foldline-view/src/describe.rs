@@ -61,6 +61,8 @@ fn parts(quantity: Quantity, model: &Model) -> (&str, &str, &'static str, &str) 
         Quantity::Integral(k) => ("integral", variable(k).map(|(name, _, text)| (name, "", text))),
         Quantity::Iterate(k, _) => ("iterate", variable(k)),
         Quantity::At(k, place) => (if f64::from_bits(place) == 0.0 { "start" } else { "end" }, variable(k)),
+        Quantity::Frequency => ("frequency", Some(("frequency", "", "1/period"))),
+        _ => ("harmonic", None),
     };
     let (name, unit, text) = found.unwrap_or_default();
     (name, unit, class, text)

@@ -80,6 +80,11 @@ pub trait VectorField: Send + Sync {
         1.0
     }
 
+    /// Derivatives `[k]` of [`VectorField::time_unit`] with respect to the parameters.
+    fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
+        vec![0.0; parameters.len()]
+    }
+
     /// `[n]` periods of f in each state: finite for an angle, infinite for other states. Empty if no state is an angle.
     ///
     /// States that differ by whole periods are identified, and an orbit closes when it returns to such a copy of its
@@ -95,6 +100,12 @@ pub trait VectorField: Send + Sync {
 
     /// The outputs: writes `[output_count × lanes]`.
     fn outputs(&self, _at: Batch, _out: &mut [f64]) {}
+
+    /// The outputs with their derivatives, into `[g, gx, gp, gt]`, laid out as by [`VectorField::linearise_switches`]
+    /// with outputs in place of switches. False, with nothing written, if the field does not provide derivatives.
+    fn linearise_outputs(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) -> bool {
+        self.output_count() == 0
+    }
 
     /// Number of switching functions: scalars at whose zeros f or one of its derivatives jumps. 0 if the field is
     /// smooth.

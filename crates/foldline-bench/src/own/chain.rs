@@ -43,6 +43,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
     let state = (0..model.states.len()).map(|i| if i % 2 == 0 { 2.0 } else { 0.0 }).collect();
     let seed = SeedPlan { name: "locked".into(), source: SeedSource::State(state), parameters, samples: 1, random: 1 };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "locked".into(),
         start: Start::Seed(0),
         free: 0,
@@ -64,6 +65,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        record: Vec::new(),
     }
 }
 

@@ -4,20 +4,26 @@ use super::{Cell, Column, Style, Table};
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown};
 use foldline::model::Model;
-use foldline::special::quantity::Quantity;
+use foldline::special::quantity::{Quantity, appended};
 
 /// Largest number of coefficients of a normal form: that of a double Hopf point.
 const COEFFICIENTS: usize = 6;
 
 /// Table of special points: branch, kind, every parameter, period, NAME_max of every output, unstable_before,
 /// unstable_after, error, normal_form, and every coefficient with its error.
-pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
+pub fn special(
+    diagram: &Diagram,
+    model: &Model,
+    record: &[(String, Quantity)],
+    kept: &dyn Fn(&Branch) -> bool,
+) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
     columns.push(Column::in_unit(duration(model), Style::Number, &model.time));
     columns.extend(turn_columns(model));
     columns.extend(end_columns(model));
     columns.extend(output_columns(model));
+    columns.extend(recorded_columns(record, model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
     columns.push(column("normal_form", Style::Word));
@@ -27,6 +33,7 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
         let special = &branch.special[index];
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Word(special.kind.name().into())];
         row.extend(place_cells(&special.point, model));
+        row.extend(recorded_cells(&special.point, record, model));
         let unstable = [special.unstable_before, special.unstable_after].map(|number| match branch.family {
             Family::Arc => Cell::Empty,
             _ => count(number),
@@ -47,7 +54,12 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
 
 /// Table of all accepted points: branch, position, every parameter, period, extremes and averages of states and
 /// outputs, accuracy, work, and multipliers (eigenvalues).
-pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
+pub fn points(
+    diagram: &Diagram,
+    model: &Model,
+    record: &[(String, Quantity)],
+    kept: &dyn Fn(&Branch) -> bool,
+) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
     columns.push(Column::in_unit(duration(model), Style::Number, &model.time));
@@ -62,6 +74,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit));
     let channels = outputs.chain(model.states.iter().map(|s| (&s.name, &s.unit)));
     columns.extend(channels.flat_map(|(name, unit)| ended(name, unit, ["mean", "rms"])));
+    columns.extend(recorded_columns(record, model));
     columns.push(column("unstable", Style::Number));
     let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
@@ -77,6 +90,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
         row.extend(
             (n..n + model.outputs.len()).chain(0..n).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]),
         );
+        row.extend(recorded_cells(point, record, model));
         row.push(if branch.family == Family::Arc { Cell::Empty } else { count(point.unstable) });
         let trust = point.trust;
         let sizes =
@@ -91,6 +105,20 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     let shown = diagram.branches.iter().filter(|b| kept(b));
     let rows = shown.flat_map(|b| b.points.iter().map(move |p| row(b, p))).collect();
     Table { columns, rows }
+}
+
+/// Columns of the quantities that the study records.
+fn recorded_columns<'r>(record: &'r [(String, Quantity)], model: &'r Model) -> impl Iterator<Item = Column> + 'r {
+    record.iter().map(|(name, quantity)| Column::in_unit(name, Style::Number, quantity.unit(model)))
+}
+
+fn recorded_cells<'r>(
+    point: &'r Point,
+    record: &'r [(String, Quantity)],
+    model: &'r Model,
+) -> impl Iterator<Item = Cell> + 'r {
+    let value = |index: usize| appended(index, model).of(point).filter(|value| value.is_finite());
+    (0..record.len()).map(move |index| value(index).map_or(Cell::Empty, Cell::Number))
 }
 
 /// Names of the work counters, in the order of [`work`].
@@ -108,14 +136,22 @@ pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool
     let ends = ["backward_end", "forward_end"].map(|name| column(name, Style::Word));
     let columns = words.into_iter().chain(numbers.map(|name| column(name, Style::Number))).chain(ends).collect();
     let row = |branch: &Branch| {
-        let moving = [Some(branch.free), branch.held.map(|(_, follows)| follows)];
+        let other = branch.also.first().map(|(index, _)| *index);
+        let moving = [Some(branch.free), branch.held.map(|(_, follows)| follows).or(other)];
         let name = |index: Option<usize>| {
             index.and_then(|k| model.parameters.get(k)).map_or(Cell::Empty, |p| Cell::Word(p.name.clone()))
         };
         let mut row = vec![
             Cell::Word(branch.name.clone()),
             Cell::Word(branch.family.name().into()),
-            branch.held.map_or(Cell::Empty, |(kind, _)| Cell::Word(kind.name().into())),
+            match (branch.held, &branch.levels[..]) {
+                (Some((kind, _)), _) => Cell::Word(kind.name().into()),
+                (None, []) => Cell::Empty,
+                (None, levels) => {
+                    let each = levels.iter().map(|(name, value)| format!("{name} = {}", Shown(*value)));
+                    Cell::Word(each.collect::<Vec<_>>().join(", "))
+                }
+            },
             name(moving[0]),
             name(moving[1]),
             Cell::Word(origin(&branch.origin)),
@@ -176,7 +212,13 @@ fn origin(origin: &Origin) -> String {
 /// Columns of the parameters. Those that vary along a branch are shown even if there is only one row.
 fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
     let shown = || diagram.branches.iter().filter(|b| kept(b));
-    let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index));
+    let varies = |index: usize| {
+        shown().any(|b| {
+            b.free == index
+                || b.held.is_some_and(|(_, follows)| follows == index)
+                || b.also.iter().any(|(other, _)| *other == index)
+        })
+    };
     let style = |index: usize| if varies(index) { Style::Number } else { Style::Varying };
     model.parameters.iter().enumerate().map(|(index, p)| Column::in_unit(&p.name, style(index), &p.unit)).collect()
 }

@@ -11,6 +11,7 @@ use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
 use foldline::model::Model;
+use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::{Part, load_part};
@@ -81,9 +82,19 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special | What::Responses | What::Notes => Part::Special,
     };
     let mut run = read(&typed.folder, part)?;
-    if run.model.conditions() != [0, 0] && matches!(typed.what(), What::Points | What::Special) {
-        // The states at the ends of an interval are part of the profiles.
+    let record = std::mem::take(&mut run.plan.record);
+    let recorded: Vec<Quantity> = record.iter().map(|(_, quantity)| *quantity).collect();
+    // The states at the ends of an interval are part of the profiles too.
+    let at_ends = run.model.conditions() != [0, 0] && matches!(typed.what(), What::Points | What::Special);
+    let needed = typed.what() == What::Points && recorded.iter().any(|quantity| quantity.needs_profile());
+    if at_ends || needed {
         run = read(&typed.folder, Part::Everything)?;
+    }
+    if matches!(typed.what(), What::Points | What::Special) {
+        for branch in &mut run.diagram.branches {
+            let special = branch.special.iter_mut().map(|special| &mut special.point);
+            branch.points.iter_mut().chain(special).for_each(|point| append(point, &recorded, &run.model));
+        }
     }
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let conversion = conversion(&run.model, &typed.unit)?;
@@ -91,9 +102,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (diagram, model) =
         (shown.as_ref().unwrap_or(&run.diagram), conversion.as_ref().map_or(&run.model, |own| own.model()));
     let table = match typed.what() {
-        What::Points => columns::points(diagram, model, &kept),
+        What::Points => columns::points(diagram, model, &record, &kept),
         What::Branches => columns::branches(diagram, model, &kept),
-        What::Special => columns::special(diagram, model, &kept),
+        What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };
@@ -144,7 +155,7 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
-        let special = columns::special(diagram, model, &|_| true);
+        let special = columns::special(diagram, model, &[], &|_| true);
         if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
     }
     if !diagram.responses.is_empty() {

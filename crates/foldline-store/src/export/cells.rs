@@ -36,6 +36,9 @@ pub(super) fn point_cells(point: &Point, model: &Model, cycles: bool) -> Vec<Cel
     out.extend(padded(point.ranges.as_flattened(), 2 * (n + outputs)));
     let of = |quantity: Quantity| quantity.of(point).map_or(Cell::Empty, Cell::Real);
     out.extend((0..n + outputs).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]));
+    // The recorded quantities follow the averages.
+    let recorded = point.averages.iter().skip(n + outputs).map(|own| own[0]);
+    out.extend(recorded.map(|value| if value.is_nan() { Cell::Empty } else { Cell::Real(value) }));
     let (state, degree, intervals) = match &point.solution {
         Solution::Equilibrium(state) => (&state[..], 0, 0),
         Solution::Cycle(cycle) => (&[][..], cycle.degree, cycle.intervals()),

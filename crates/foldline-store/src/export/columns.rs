@@ -2,6 +2,7 @@
 
 use crate::run_file::{Columns, free_name};
 use foldline::model::Model;
+use foldline::special::quantity::Quantity;
 
 /// Type of the cells of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +44,8 @@ pub(super) struct Variables {
     ranges: Vec<Column>,
     averages: Vec<Column>,
     states: Vec<Column>,
+    /// Quantities that the study records.
+    recorded: Vec<Column>,
     /// Unit of time; empty if unknown.
     time: String,
 }
@@ -109,7 +112,7 @@ const OWN: &[&str] = &[
 ];
 
 impl Variables {
-    pub(super) fn new(model: &Model) -> Variables {
+    pub(super) fn new(model: &Model, record: &[(String, Quantity)]) -> Variables {
         let names = Columns::new(model);
         let mut taken: Vec<String> = OWN.iter().map(|name| name.to_string()).collect();
         let mut labelled = |name: &String, unit: &str, description: String| Column {
@@ -143,7 +146,12 @@ impl Variables {
         let turns = model.angles().map(turn).collect();
         let states = model.states.iter();
         let states = states.map(|s| labelled(&s.name, &s.unit, described(&s.name, &s.description))).collect();
-        Variables { parameters, turns, ranges, averages, states, time: model.time.clone() }
+        // Names in files of arrays are letters, digits and underscores.
+        let plain =
+            |name: &str| name.replace('/', "_over_").replace('-', "_minus_").replace('+', "_plus_").replace(' ', "");
+        let own = |(name, quantity): &(String, Quantity)| labelled(&plain(name), quantity.unit(model), name.clone());
+        let recorded = record.iter().map(own).collect();
+        Variables { parameters, turns, ranges, averages, states, recorded, time: model.time.clone() }
     }
 
     /// Columns of the states of an equilibrium or of a profile.
@@ -165,6 +173,7 @@ impl Variables {
         out.extend_from_slice(&self.turns);
         out.extend_from_slice(&self.ranges);
         out.extend_from_slice(&self.averages);
+        out.extend_from_slice(&self.recorded);
         if !cycles {
             out.extend_from_slice(&self.states);
         }

@@ -23,6 +23,7 @@ use crate::study_file::{Study, parse_study_of_run};
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::model::Model;
+use foldline::special::quantity::{Quantity, append};
 use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -112,6 +113,8 @@ impl Export {
 
     /// Returns a point in the units of the export.
     fn shown(&self, mut point: Point) -> Point {
+        let recorded: Vec<Quantity> = self.study.plan.record.iter().map(|(_, quantity)| *quantity).collect();
+        append(&mut point, &recorded, &self.study.model);
         if let Some(conversion) = &self.conversion {
             conversion.point(&mut point);
         }

@@ -24,7 +24,7 @@ struct Numbers {
 /// Writes the file.
 pub(super) fn write(export: &Export, path: &Path) -> Result<Vec<PathBuf>, ExportError> {
     let (growing, file) = Growing::create(path)?;
-    let variables = Variables::new(export.model());
+    let variables = Variables::new(export.model(), &export.study.plan.record);
     let (plan, mut numbers) = planned(export, &variables)?;
     let mut laid = plan.lay(file).map_err(|error| growing.failed(error))?;
     let failed = |error| growing.failed(error);

@@ -18,7 +18,7 @@ pub(super) type Begin = dyn Fn(&Path, &str, &[Column]) -> Result<Box<dyn Rows>, 
 
 /// Writes `branches`, `points` and `special_points`, and the other tables if they have rows.
 pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec<PathBuf>, ExportError> {
-    let variables = Variables::new(export.model());
+    let variables = Variables::new(export.model(), &export.study.plan.record);
     let mut done = vec![branches(export, folder, begin)?];
     done.extend(points(export, folder, begin, &variables)?);
     if !export.diagram.responses.is_empty() {

@@ -212,7 +212,23 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         let number: i64 = row.get("branch").map_err(|e| e.to_string())?;
         Ok((number, branch_in(row)?))
     })?;
+    let held =
+        read(connection, path, "SELECT name FROM sqlite_master WHERE name = 'held_quantities'", &[], |_| Ok(()))?;
     for (number, mut branch) in branches {
+        if !held.is_empty() {
+            let sql = "SELECT parameter, name, value_bytes FROM held_quantities WHERE branch = ?1 ORDER BY rowid";
+            let rows = read(connection, path, sql, &[number], |row| {
+                let parameter: Option<i64> = row.get("parameter").map_err(|e| e.to_string())?;
+                let name: String = row.get("name").map_err(|e| e.to_string())?;
+                Ok((parameter, name, super::rows::single(row, "value_bytes")?))
+            })?;
+            for (parameter, name, value) in rows {
+                match parameter.map(usize::try_from) {
+                    Some(Ok(index)) => branch.also.push((index, value)),
+                    _ => branch.levels.push((name, value)),
+                }
+            }
+        }
         let of_branch = |columns: &str, table: &str, order: &str| {
             format!("SELECT {columns} FROM {table} WHERE branch = ?1 ORDER BY {order}")
         };

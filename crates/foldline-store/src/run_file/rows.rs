@@ -260,6 +260,7 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
         | Ending::SolutionUnbounded(why)
         | Ending::NotFinite(why)
         | Ending::GivenUp(why)
+        | Ending::HeldCorner(why)
         | Ending::NoStart(why) => (Some(why.clone()), None, None, None),
         Ending::PointLimit(points) => (None, None, Some(*points), None),
         Ending::Closed | Ending::Stopped => (None, None, None, None),
@@ -292,6 +293,7 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
         }
         "not-finite" => Ending::NotFinite(detail()?),
         "given-up" => Ending::GivenUp(detail()?),
+        "held-corner" => Ending::HeldCorner(detail()?),
         "no-start" => Ending::NoStart(detail()?),
         "stopped" => Ending::Stopped,
         other => {
@@ -362,7 +364,7 @@ pub(super) fn kind_named(name: &str) -> Result<Kind, String> {
     Kind::from_name(name).ok_or_else(|| format!("unknown kind \"{name}\""))
 }
 
-fn single(row: &Row, name: &str) -> Result<f64, String> {
+pub(super) fn single(row: &Row, name: &str) -> Result<f64, String> {
     let bytes: Vec<u8> = row.get(name).map_err(|e| e.to_string())?;
     unpack(&bytes).and_then(|v| v.first().copied()).ok_or_else(|| format!("{name} is empty"))
 }

@@ -156,6 +156,7 @@ fn average(quantity: Quantity, averages: &[[f64; 2]], period: Option<f64>) -> Op
         Quantity::Mean(k) => averages.get(k).map(|own| own[0]),
         Quantity::Rms(k) => averages.get(k).map(|own| root(own[1])),
         Quantity::Integral(k) => averages.get(k).zip(period).map(|(own, period)| own[0] * period),
+        Quantity::Frequency => period.map(|period| 1.0 / period),
         Quantity::Norm(n) => {
             averages.get(..n).filter(|own| !own.is_empty()).map(|own| root(own.iter().map(|a| a[1]).sum()))
         }

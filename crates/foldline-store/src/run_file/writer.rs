@@ -1,5 +1,6 @@
 //! Writer of a run in progress.
 
+use super::bytes::pack;
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
@@ -474,6 +475,10 @@ fn insert(connection: &Connection, sql: &str, values: Vec<Value>) -> rusqlite::R
     connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
 }
 
+/// Held quantities of branches, with their values, and the further free parameters, with their scales.
+const HELD_QUANTITIES: &str = "CREATE TABLE IF NOT EXISTS held_quantities (branch INTEGER NOT NULL REFERENCES branches,
+     parameter INTEGER, name TEXT NOT NULL, value REAL, value_bytes BLOB NOT NULL);";
+
 impl State {
     /// Stores a new or resumed branch and returns its number.
     fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
@@ -494,6 +499,20 @@ impl State {
         )?;
         let number: i64 =
             transaction.query_row("SELECT branch FROM branches WHERE name = ?", [&branch.name], |row| row.get(0))?;
+        // Files of runs without held quantities stay as earlier versions write them.
+        if !branch.also.is_empty() {
+            transaction.execute_batch(HELD_QUANTITIES)?;
+            transaction.execute("DELETE FROM held_quantities WHERE branch = ?", [number])?;
+            let parameters = branch.also.iter().map(|(index, unit)| (Some(*index as i64), String::new(), *unit));
+            let levels = branch.levels.iter().map(|(name, value)| (None, name.clone(), *value));
+            for (index, name, value) in parameters.chain(levels) {
+                let bytes = pack(&[value]);
+                transaction.execute(
+                    "INSERT INTO held_quantities VALUES (?, ?, ?, ?, ?)",
+                    params![number, index, name, value, bytes],
+                )?;
+            }
+        }
         for (side, _) in branch.ends.iter().enumerate().filter(|(_, end)| end.is_none()) {
             transaction.execute("DELETE FROM ends WHERE branch = ? AND side = ?", params![number, side as i64])?;
         }

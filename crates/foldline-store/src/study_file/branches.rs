@@ -1,11 +1,13 @@
 //! `[[branch]]`: branches to continue.
 
+use super::holds;
 use super::items::{Ground, Item, Known, max_points, origin};
 use super::unknown_parameter;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::diagram::{Kind, Shown};
+use foldline::explore::plan::Holds;
 use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::{Model, Parameter, unsupported};
 use foldline::special::mark::Mark;
@@ -13,8 +15,21 @@ use foldline::special::quantity::Quantity;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 10] =
-    ["name", "description", "from", "free", "range", "until", "switch", "mark", "stop", "max-points"];
+pub(super) const KEYS: [&str; 13] = [
+    "name",
+    "description",
+    "from",
+    "free",
+    "hold",
+    "near",
+    "range",
+    "until",
+    "switch",
+    "mark",
+    "stop",
+    "peaks",
+    "max-points",
+];
 const SWITCHABLE: [Kind; 3] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf];
 
 /// Reads a branch and adds its plan to the items read so far.
@@ -28,15 +43,58 @@ pub(super) fn read(
     let table = item.table;
     walk.only(table, &KEYS, "a branch");
     let origin = origin(walk, item, ground, all);
-    let free = free(walk, item, ground.model);
+    let several = table.get("free").is_some_and(|value| value.get_ref().is_array());
+    let mut held = (several || table.contains_key("hold")).then(|| holds::read(walk, item, ground.model));
+    if let Some(Some(held)) = &mut held {
+        holds::others(walk, item, held, ground.model);
+    }
+    let free = match &held {
+        Some(held) => held.as_ref().map(|held| held.free),
+        None => free(walk, item, ground.model),
+    };
+    if held.is_none()
+        && let Some(value) = table.get("near")
+    {
+        walk.report(value.span(), "`near` selects the start of a branch with `hold`", "remove it, or add `hold`");
+    }
     let switching = table.get("switch").map(|value| switching(walk, value)).unwrap_or_default();
     let marks = marks(walk, table, ground.model);
     let max_points = max_points(walk, item);
     let start_value = origin.as_ref().zip(free).and_then(|((_, at, _), free)| at[free]);
-    let bounds = bounds(walk, item, start_value, free.map(|f| &ground.model.parameters[f]));
+    let own = free.map(|f| &ground.model.parameters[f]);
+    let bounds = match &held {
+        Some(held) => holds::bounds(walk, item, held.as_ref(), start_value, own),
+        None => bounds(walk, item, start_value, own),
+    };
+    if let (Some(Some(held)), Some((start, _, family))) = (&held, &origin) {
+        holds::fits(walk, item, held, start, *family, ground);
+    }
+    if let (None, Some(index), Some(value)) = (&held, free, table.get("peaks"))
+        && marks.iter().any(|mark| mark.peak && matches!(mark.quantity, Quantity::Parameter(_)))
+    {
+        let name = &ground.model.parameters[index].name;
+        let message = format!("{name} turns at folds, which are found anyway, and the other parameters are constant");
+        walk.report(value.span(), message, "quantities of the solution, such as `peaks = [\"x_max\"]`");
+    }
     let (name, (start, beginning, family), free, (range, until)) = (name?, origin?, free?, bounds?);
     let mut end = beginning.clone();
     end[free] = until;
+    let holds = match held {
+        Some(held) => held?.holds,
+        None => Holds::default(),
+    };
+    holds.others.iter().for_each(|(other, _)| end[*other] = None);
+    // The start is a mark on the branch from which this one starts.
+    if let Start::EndOf(parent) | Start::EndOfSwitched(parent, _) = &start {
+        let sought = holds.levels.iter().filter(|level| level.value.is_finite());
+        let sought: Vec<Mark> = sought.map(|level| Mark::at(level.quantity, level.value, false)).collect();
+        let marks = &mut ground.items.branches[*parent].marks;
+        for mark in sought {
+            if !marks.iter().any(|own| own.quantity == mark.quantity && own.value == mark.value) {
+                marks.push(mark);
+            }
+        }
+    }
     let index = ground.items.branches.len();
     ground.items.branches.push(BranchPlan {
         name: name.clone(),
@@ -47,6 +105,7 @@ pub(super) fn read(
         switching,
         marks,
         max_points,
+        holds,
     });
     Some(Known { name, start: Start::EndOf(index), beginning, end: Some(end), family })
 }
@@ -168,7 +227,23 @@ pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 
 pub(super) fn marks(walk: &mut Walk, table: &DeTable, model: &Model) -> Vec<Mark> {
     let mut marks = values(walk, table.get("mark"), "`mark`", false, model);
     marks.extend(values(walk, table.get("stop"), "`stop`", true, model));
+    let peaks = table.get("peaks").map(|value| quantities(walk, value, "`peaks`", model));
+    marks.extend(peaks.into_iter().flatten().map(|(quantity, _)| Mark::peak(quantity)));
     marks
+}
+
+/// Reads a list of names of quantities; a single name may stand alone.
+pub(super) fn quantities(walk: &mut Walk, value: &Value, what: &str, model: &Model) -> Vec<(Quantity, Range<usize>)> {
+    let list: Vec<&Value> = match value.get_ref().as_array() {
+        Some(list) => list.iter().collect(),
+        None => vec![value],
+    };
+    let mut found = Vec::new();
+    for one in list {
+        let Some(name) = walk.string(one, &format!("an entry of {what}")) else { continue };
+        found.extend(quantity(walk, &name, one.span(), model).map(|quantity| (quantity, one.span())));
+    }
+    found
 }
 
 /// Reads values of quantities: one number or a list for each.
@@ -177,34 +252,58 @@ fn values(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model:
     let mut marks = Vec::new();
     for (key, value) in table.iter() {
         let Some(quantity) = quantity(walk, key.get_ref(), key.span(), model) else { continue };
-        let unit = unit_of(quantity, model);
+        let unit = reading_unit(quantity, model);
         let values: Vec<f64> = match value.get_ref().as_array() {
             Some(list) => list.iter().filter_map(|one| walk.quantity(one, "a value", unit)).collect(),
             None => walk.quantity(value, "the value", unit).into_iter().collect(),
         };
-        marks.extend(values.into_iter().map(|value| Mark { quantity, value, stop }));
+        marks.extend(values.into_iter().map(|value| Mark::at(quantity, value, stop)));
     }
     marks
 }
 
-/// Returns the unit of a quantity of a branch; empty if it has none of its own.
-fn unit_of(quantity: Quantity, model: &Model) -> &str {
-    match quantity {
-        Quantity::Parameter(k) => &model.parameters[k].unit,
-        Quantity::Period => &model.time,
-        Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => model.channel_unit(k),
-        Quantity::Iterate(k, _) | Quantity::At(k, _) => model.channel_unit(k),
-        Quantity::Integral(_) | Quantity::Norm(_) => "",
+/// Suggestion for an unknown quantity; the ways to write harmonics if the name looks like one.
+fn cure(name: &str, known: &[&str], model: &Model) -> String {
+    if !(name.contains("_h") || name.contains(['/', '-', '+']) || name.ends_with("_dB") || name.ends_with("_phase")) {
+        return suggest(name, known);
+    }
+    if model.iterated() {
+        return format!("cycles of maps have no harmonics; {}", suggest(name, known));
+    }
+    let x = model.outputs.first().map(|own| &own.name).or(model.states.first().map(|own| &own.name));
+    let x = x.map_or("x", String::as_str);
+    format!(
+        "a state or output followed by `_h` and an order: `{x}_h1`, `{x}_h3_phase`, `{x}_h1_2` for the order 1/2, \
+         `{x}_h1_dB`; a ratio such as `{x}_h1/{x}_h3`; a difference of phases of one order such as \
+         `{x}_h1_phase-{x}_h1_phase`; a pair such as `u+iv_h-1`"
+    )
+}
+
+/// Unit in which values of a quantity are written; degrees and decibels are plain numbers.
+pub(super) fn reading_unit(quantity: Quantity, model: &Model) -> &str {
+    match quantity.unit(model) {
+        "deg" | "dB" if quantity.needs_profile() => "",
+        unit => unit,
     }
 }
 
 /// Returns the quantity of a branch with the given name.
-fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> Option<Quantity> {
+pub(super) fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> Option<Quantity> {
     let found = Quantity::named(name, model);
     if found.is_none() {
         let all = Quantity::names(model);
         let known: Vec<&str> = all.iter().map(String::as_str).collect();
-        walk.report(span, format!("`{name}` is not a quantity of a branch"), suggest(name, &known));
+        walk.report(span.clone(), format!("`{name}` is not a quantity of a branch"), cure(name, &known, model));
+    }
+    if let Some(found) = found
+        && found.is_phase()
+        && !model.forced()
+        && matches!(found, Quantity::Of(_))
+    {
+        let message = format!("`{name}`: without forcing the phase of a cycle is arbitrary");
+        let other = model.states.last().map_or("y", |own| own.name.as_str());
+        walk.report(span, message, format!("a difference of two phases, such as `{name}-{other}_h1_phase`"));
+        return None;
     }
     found
 }

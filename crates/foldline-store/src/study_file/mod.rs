@@ -9,6 +9,7 @@
 mod branches;
 mod curves;
 mod explorations;
+mod holds;
 mod homotopies;
 mod items;
 mod profiles;
@@ -24,6 +25,7 @@ use foldline::attractors::Limits;
 use foldline::contract::VectorField;
 use foldline::explore::Plan;
 use foldline::model::{Model, conserved, in_words};
+use foldline::special::quantity::Quantity;
 use items::Items;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -60,7 +62,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 17] = [
+const ROOT_KEYS: [&str; 18] = [
     "model",
     "title",
     "description",
@@ -70,6 +72,7 @@ const ROOT_KEYS: [&str; 17] = [
     "max-steps",
     "max-time",
     "store",
+    "record",
     "parameters",
     "seed",
     "branch",
@@ -209,6 +212,13 @@ fn parse(
         override_parameters(&mut walk, value, &model, &mut defaults);
     }
     no_motions(&mut walk, &root, &model);
+    let record: Vec<(String, Quantity)> = root
+        .get("record")
+        .map(|value| branches::quantities(&mut walk, value, "`record`", &model))
+        .into_iter()
+        .flatten()
+        .map(|(quantity, span)| (text[span].trim_matches(['"', '\'']).to_string(), quantity))
+        .collect();
     let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
@@ -242,6 +252,7 @@ fn parse(
         explorations,
         surveys,
         sweeps,
+        record,
     };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
 }
@@ -265,6 +276,15 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
             ),
         };
         walk.report(span, message, hint);
+    }
+    for (_, table) in walk.tables(root, "branch") {
+        for key in ["hold", "peaks"] {
+            if let Some(value) = table.get(key) {
+                let message = format!("`{key}` is not supported for boundary-value problems");
+                let hint = "make the quantity a condition of the model, with the second parameter under `solve`";
+                walk.report(value.span(), message, hint);
+            }
+        }
     }
 }
 

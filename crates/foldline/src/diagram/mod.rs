@@ -349,13 +349,15 @@ pub enum Kind {
     BoundaryEquilibrium,
     /// A quantity has a requested value.
     Mark,
+    /// A quantity is largest or smallest along the branch.
+    Peak,
     /// A stability change that no located special point explains.
     Unexplained,
 }
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 25] = [
+    pub const ALL: [Kind; 26] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -380,6 +382,7 @@ impl Kind {
         Kind::Sliding,
         Kind::BoundaryEquilibrium,
         Kind::Mark,
+        Kind::Peak,
         Kind::Unexplained,
     ];
 
@@ -387,7 +390,7 @@ impl Kind {
     pub fn has_codimension_two(self) -> bool {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
-            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding)
+            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::Peak)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -435,6 +438,7 @@ impl Kind {
             Kind::Sliding => "sliding",
             Kind::BoundaryEquilibrium => "boundary-equilibrium",
             Kind::Mark => "mark",
+            Kind::Peak => "peak",
             Kind::Unexplained => "unexplained",
         }
     }
@@ -675,6 +679,8 @@ pub enum Ending {
     NoStart(String),
     /// A quantity reached the value at which the study asks to stop.
     Asked(f64),
+    /// On a branch on which a largest value is held, another maximum of the cycle becomes the largest.
+    HeldCorner(String),
     /// The observer asked to stop.
     Stopped,
 }
@@ -696,6 +702,7 @@ impl Ending {
             Ending::GivenUp(_) => "given-up",
             Ending::NoStart(_) => "no-start",
             Ending::Asked(_) => "asked",
+            Ending::HeldCorner(_) => "held-corner",
             Ending::Stopped => "stopped",
         }
     }
@@ -750,6 +757,7 @@ impl fmt::Display for Ending {
             Ending::NotFinite(why) => write!(f, "vector field not finite: {why}"),
             Ending::GivenUp(why) => write!(f, "given up: {why}"),
             Ending::NoStart(why) => write!(f, "no starting solution: {why}"),
+            Ending::HeldCorner(why) => write!(f, "corner of a held extreme value: {why}"),
             Ending::Stopped => write!(f, "stopped on request"),
         }
     }
@@ -784,6 +792,11 @@ pub struct Branch {
     pub free: usize,
     /// For a bifurcation curve: the bifurcation, and the index of the first parameter, which is solved for.
     pub held: Option<(Kind, usize)>,
+    /// On a branch with held quantities: further free parameters, which are solved for, with their scales. The
+    /// components of the tangents that belong to them come before that of the continuation parameter.
+    pub also: Vec<(usize, f64)>,
+    /// On a branch with held quantities: the names of the quantities, and their values.
+    pub levels: Vec<(String, f64)>,
     /// Scales of the first parameter of a bifurcation curve (otherwise 1) and of the continuation parameter. The last
     /// components of the tangents are changes of the parameters relative to these.
     pub units: [f64; 2],
@@ -829,6 +842,8 @@ impl Branch {
             family,
             free,
             held: None,
+            also: Vec::new(),
+            levels: Vec::new(),
             units: [1.0; 2],
             origin,
             points: Vec::new(),

@@ -102,6 +102,14 @@ impl VectorField for Counted<'_> {
         self.field.integrands(at, free, to);
     }
 
+    fn linearise_outputs(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) -> bool {
+        self.field.linearise_outputs(at, free, to)
+    }
+
+    fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
+        self.field.time_unit_slopes(parameters)
+    }
+
     fn linearise_switches(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
         self.field.linearise_switches(at, free, to);
     }

@@ -98,6 +98,7 @@ impl Discovery<'_, '_> {
         self.named.push(kind.clone());
         let number = self.named.iter().filter(|other| **other == kind).count();
         let branch = BranchPlan {
+            holds: Default::default(),
             name: format!("{}/{kind}-{number}", plan.name),
             start: Start::Seed(0),
             free: plan.free,
@@ -207,7 +208,7 @@ impl Discovery<'_, '_> {
             marks: Vec::new(),
             max_points: plan.max_points,
         };
-        let home = Mark { quantity: Quantity::Parameter(second), value: plan.parameters[second], stop: false };
+        let home = Mark::at(Quantity::Parameter(second), plan.parameters[second], false);
         let earlier = work.earlier.branch(&curve.name);
         curves::follow_from(work.system, work.plan, &curve, parent, Ok(fold), &[home], earlier, work.observer)
     }

@@ -2,10 +2,10 @@
 
 use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
-use super::plan::{BranchPlan, Plan, Start, Switching};
+use super::plan::{BranchPlan, Holds, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, arrival, crossings, curves, discovery, homotopy, known, switch};
-use crate::continuation::Settings;
+use super::{System, arrival, crossings, curves, discovery, holds, homotopy, known, switch};
+use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
 use std::ops::Range;
@@ -181,8 +181,11 @@ impl Work<'_> {
         let origin = || Origin::EndOf(name.to_string());
         let branches = (0..plan.branches.len()).filter(|&i| plan.branches[i].start == start);
         let homotopies = (0..plan.homotopies.len()).filter(|&i| plan.homotopies[i].start == start);
-        branches.into_iter().all(|i| self.planned(i, origin(), point.clone()))
-            && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
+        branches.into_iter().all(|i| {
+            let parent = self.branches.iter().find(|branch| branch.name == name);
+            let held = parent.and_then(|parent| holds::on_branch(self.system, &plan.branches[i], parent, &point));
+            self.planned(i, origin(), held.unwrap_or_else(|| point.clone()))
+        }) && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
     }
 
     /// Follows a homotopy, and everything that starts at its goal.
@@ -220,8 +223,69 @@ impl Work<'_> {
         (growth::settings(self.system, self.plan.tolerance, range, plan.max_points), sides)
     }
 
+    /// Follows a branch on which quantities are held, or resumes it.
+    fn held(&self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> Option<(Branch, bool)> {
+        let bounded = |(settings, sides): (Settings, [bool; 2])| {
+            let bounds = plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
+            (Settings { bounds, ..settings }, sides)
+        };
+        let grow = |holds: &Holds, settings: &Settings, sides, branch: &mut Branch, station: Option<Station>| {
+            let system = System { holds: Some(holds), ..self.system.clone() };
+            let growth = Growth { system: &system, ..self.growth(plan, settings, sides, &[]) };
+            match station {
+                Some(station) => growth.begin(branch, Beginning::Inside(station)),
+                None => growth.resume(branch),
+            }
+        };
+        if let Some(earlier) = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty()) {
+            let (settings, sides) =
+                bounded(self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?));
+            let mut holds = plan.holds.clone();
+            holds.levels.iter_mut().zip(&earlier.levels).for_each(|(level, (_, value))| level.value = *value);
+            let mut branch = earlier.clone();
+            let going = grow(&holds, &settings, sides, &mut branch, None);
+            return Some((branch, going));
+        }
+        let family = match &start {
+            Ok(point) => self.system.family_of(&point.solution),
+            Err(_) if self.system.is_open() => Family::Arc,
+            Err(_) => Family::Cycle,
+        };
+        let mut branch = Branch::new(&plan.name, family, plan.free, origin);
+        let begun = start.and_then(|point| {
+            let moving: Vec<(usize, [f64; 2])> =
+                plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
+            self.system.repeats(&point.parameters, &[&moving[..], &[(plan.free, plan.range)]].concat())?;
+            let (settings, sides) = bounded(self.growth_settings(plan, &point));
+            let holds = holds::resolved(self.system, &plan.holds, &point)?;
+            let station = holds::first(self.system, plan, &holds, self.plan.degree, &settings, &point)?;
+            let outside = |index: usize, [low, high]: [f64; 2]| {
+                let value = station.point.parameters.get(index).copied().unwrap_or(low);
+                (value < low || value > high).then(|| {
+                    format!("the start {} lies outside the range [{}, {}]", Shown(value), Shown(low), Shown(high))
+                })
+            };
+            let mut ranges = settings.bounds.clone();
+            if plan.until.is_none() {
+                ranges.push((plan.free, plan.range));
+            }
+            match ranges.into_iter().find_map(|(index, range)| outside(index, range)) {
+                Some(why) => Err(why),
+                None => Ok((holds, settings, sides, station)),
+            }
+        });
+        let going = match begun {
+            Ok((holds, settings, sides, station)) => grow(&holds, &settings, sides, &mut branch, Some(station)),
+            Err(why) => without_start(self.observer, &mut branch, why),
+        };
+        Some((branch, going))
+    }
+
     /// Follows a branch of the plan itself, or resumes it if an earlier run has it.
     fn root(&self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> Option<(Branch, bool)> {
+        if !plan.holds.levels.is_empty() {
+            return self.held(plan, origin, start);
+        }
         let known = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty());
         if let Some(earlier) = known {
             let (settings, sides) = self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?);

@@ -1,6 +1,7 @@
 //! Continuation of one branch to both sides, from its start or from the end of an earlier run.
 
 use super::counted::Counted;
+use super::plan::Holds;
 use super::symmetry::{is_rotating_wave, rotation};
 use super::{System, corner};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
@@ -13,6 +14,8 @@ use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
+use crate::special::on_levels::{Corner, OnLevels};
+use crate::special::peak::Peak;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse, grazing, sliding};
@@ -44,16 +47,50 @@ impl Line {
         }
     }
 
-    /// Returns the problem of this curve through `point`, on the mesh of the point.
-    pub fn problem<'a>(&self, system: &'a System, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
+    /// Returns the setting of this curve at given parameters.
+    fn setting<'a>(&self, system: &'a System, parameters: &[f64]) -> Setting<'a> {
+        let others = system.holds.filter(|_| self.held.is_none()).into_iter().flat_map(|holds| &holds.others);
         let determined = system.field.determined().iter().copied();
-        let both: Vec<usize> = determined.chain(self.held.map(|(_, first)| first)).chain([self.free]).collect();
-        let setting = Setting {
+        let first = determined.chain(others.map(|(index, _)| *index)).chain(self.held.map(|(_, first)| first));
+        Setting {
             field: system.field,
             scales: &system.scales,
-            parameters: point.parameters.clone(),
-            axes: both.into_iter().map(|index| self.axis(system, index)).collect(),
+            parameters: parameters.to_vec(),
+            axes: first.chain([self.free]).map(|index| self.axis(system, index)).collect(),
+        }
+    }
+
+    /// Returns the problem with held quantities through `point`.
+    fn holding<'a>(
+        &self,
+        system: &'a System,
+        holds: &Holds,
+        setting: Setting<'a>,
+        degree: usize,
+        point: &Point,
+    ) -> Box<dyn ZeroProblem + 'a> {
+        let (like, surface): (Solution, Box<dyn ZeroProblem + 'a>) = match &point.solution {
+            _ if system.field.iterated() => {
+                (point.solution.clone(), Box::new(MapProblem::like(setting.clone(), &point.solution)))
+            }
+            Solution::Equilibrium(_) => (point.solution.clone(), Box::new(EquilibriumProblem::new(setting.clone()))),
+            Solution::Cycle(cycle) => {
+                let cycle = mesh::at_least_some(cycle, degree);
+                let problem = Box::new(CycleProblem::like(setting.clone(), &cycle));
+                (Solution::Cycle(cycle), problem)
+            }
         };
+        let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
+        let condition = OnLevels::new(setting, &holds.levels, &sizes, &like);
+        Box::new(Held::new(surface, Box::new(condition)))
+    }
+
+    /// Returns the problem of this curve through `point`, on the mesh of the point.
+    pub fn problem<'a>(&self, system: &'a System, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
+        let setting = self.setting(system, &point.parameters);
+        if let Some(holds) = system.holds.filter(|_| self.held.is_none()) {
+            return self.holding(system, holds, setting, degree, point);
+        }
         if system.field.iterated() {
             let condition = self
                 .held
@@ -308,6 +345,10 @@ impl Growth<'_> {
     /// Follows a new branch. Returns false if the observer wants to stop.
     pub fn begin(&self, branch: &mut Branch, beginning: Beginning) -> bool {
         branch.units = [branch.held.map_or(1.0, |(_, first)| self.system.unit(first)), self.system.unit(branch.free)];
+        if let Some(holds) = self.system.holds {
+            branch.also = holds.others.iter().map(|(index, _)| (*index, self.system.unit(*index))).collect();
+            branch.levels = holds.levels.iter().map(|level| (level.name.clone(), level.value)).collect();
+        }
         let mut going = self.tell(Event::Begin(branch));
         match beginning {
             Beginning::Inside(mut start) => {
@@ -335,7 +376,8 @@ impl Growth<'_> {
         // Near a bifurcation the slope contains the rounding of the parameter divided by a small distance.
         let next_to = !starts_inside(branch) && start.parameter_slope().abs() < STANDS / super::switch::DISTANCES[0];
         let family = start.is_one_of_family() || (next_to && start.solution.period().is_some());
-        if self.settings.stability && (family || self.is_symmetric(branch, start)) {
+        let neutral = self.system.holds.is_some() && start.neutral_multiplier().is_some();
+        if self.settings.stability && (family || neutral || self.is_symmetric(branch, start)) {
             start.unstable = start.unstable_besides_neutral();
         }
     }
@@ -371,7 +413,7 @@ impl Growth<'_> {
         let Some(point) = branch.points.iter().find(|p| p.position == 0) else { return true };
         let known =
             |s: &SpecialPoint| s.kind == Kind::Mark && s.point.position == 0 && s.point.parameters == point.parameters;
-        let meant = |mark: &Mark| mark.quantity.of(point) == Some(mark.value);
+        let meant = |mark: &Mark| mark.meets(point, self.system.field);
         if !self.marks.iter().any(meant) || branch.special.iter().any(known) {
             return true;
         }
@@ -488,8 +530,13 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let symmetric = self.is_symmetric(branch, &last);
+        // Where quantities are held, a conservative system has a multiplier 1 but no vertical branch.
+        let neutral = system.holds.is_some() && last.neutral_multiplier().is_some();
+        let symmetric = neutral || self.is_symmetric(branch, &last);
         let (monitors, collapses) = match branch.held {
+            None if system.holds.is_some() => {
+                (special::monitors_of_held_quantities(branch.family, symmetric), collapses(branch, &system))
+            }
             None => (special::monitors(branch.family, symmetric), collapses(branch, &system)),
             Some((kind, first)) => {
                 let monitors =
@@ -499,8 +546,14 @@ impl Growth<'_> {
                 (monitors, at.map(|at| shrinks(&system, first, at)).into_iter().collect())
             }
         };
-        let mut marks: Vec<Box<dyn Monitor>> =
-            self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
+        let own = self.line(branch).setting(&system, &last.parameters);
+        let mut marks: Vec<Box<dyn Monitor + '_>> =
+            self.marks.iter().map(|mark| mark.monitor(system.size_of(mark.quantity), &own)).collect();
+        if let Some(holds) = system.holds {
+            let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
+            let corners = Corner::all(system.field, &holds.levels, &sizes, self.settings.tolerance);
+            marks.extend(corners.into_iter().map(|corner| Box::new(corner) as Box<dyn Monitor>));
+        }
         let on_surfaces =
             branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium));
         if !on_surfaces && !system.field.iterated() {
@@ -518,7 +571,8 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
-        let (free, corners) = (branch.free, branch.held.is_none() && system.field.switch_count() > 0);
+        let (free, corners) =
+            (branch.free, branch.held.is_none() && system.holds.is_none() && system.field.switch_count() > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let mut walk = Follow {
             problem: &mut *problem,
@@ -550,6 +604,7 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
+                    self.tell_folds(&system, branch, &mut special);
                     if branch.family == Family::Arc {
                         (special.unstable_before, special.unstable_after) = (0, 0);
                     }
@@ -637,7 +692,7 @@ impl Growth<'_> {
     /// Moves a mark at a value of the parameter itself to exactly that value.
     fn place_exactly(&self, system: &System, branch: &Branch, special: &mut SpecialPoint) {
         const SAME: f64 = 1e-6;
-        let own = self.marks.iter().filter(|mark| mark.quantity == Quantity::Parameter(branch.free));
+        let own = self.marks.iter().filter(|mark| !mark.peak && mark.quantity == Quantity::Parameter(branch.free));
         let off = |mark: &Mark| (mark.value - special.point.parameters[branch.free]).abs();
         let near =
             own.filter(|mark| off(mark) <= SAME * branch.size(mark.value)).min_by(|a, b| off(a).total_cmp(&off(b)));
@@ -658,6 +713,9 @@ impl Growth<'_> {
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
+        if special.kind == Kind::Peak {
+            return Coefficients { remark: self.peak(branch, special), ..Coefficients::default() };
+        }
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
                 Kind::Grazing if special.remark.starts_with(corner::SLIDING) => special.remark.clone(),
@@ -673,6 +731,14 @@ impl Growth<'_> {
         }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };
+        let alone;
+        let special = match system.holds {
+            None => special,
+            Some(_) => {
+                alone = self.alone(system, branch, special);
+                &alone
+            }
+        };
         match &special.point.solution {
             Solution::Equilibrium(there) => {
                 let mut at = special.point.clone();
@@ -713,6 +779,54 @@ impl Growth<'_> {
         }
     }
 
+    /// Says whether the quantity at a peak is largest or smallest, compared with the points next to it.
+    fn peak(&self, branch: &Branch, special: &SpecialPoint) -> String {
+        let own = self.line(branch).setting(self.system, &special.point.parameters);
+        let rate = |mark: &Mark| Peak { quantity: mark.quantity, setting: own.clone() }.rate(&special.point);
+        let size = |mark: &Mark| mark.quantity.on(&special.point, self.system.field).map_or(1.0, f64::abs);
+        let flat = |mark: &Mark| rate(mark).map_or(f64::INFINITY, |rate| rate.abs() / size(mark));
+        let nearest = self.marks.iter().filter(|mark| mark.peak).min_by(|a, b| flat(a).total_cmp(&flat(b)));
+        let Some(mark) = nearest else { return String::new() };
+        let value = |point: &Point| mark.quantity.on(point, self.system.field);
+        let beside = [branch.points.last(), branch.points.first()].into_iter().flatten();
+        let near = beside.min_by_key(|point| (point.position - special.point.position).abs());
+        let (Some(here), Some(there)) = (value(&special.point), near.and_then(value)) else { return String::new() };
+        let name = mark.quantity.name(&self.system.channel_names);
+        format!("{} {name} = {}", if here > there { "largest" } else { "smallest" }, significant(here))
+    }
+
+    /// A special point of a branch with held quantities as one of a branch in the continuation parameter alone.
+    fn alone(&self, system: &System, branch: &Branch, special: &SpecialPoint) -> SpecialPoint {
+        let alone = System { holds: None, ..system.clone() };
+        let mut problem = problem_of(&alone, branch.free, self.degree, &special.point, false);
+        let u = problem.unknowns_of(&special.point);
+        problem.anchor(&u);
+        let tangent = direction(&mut *problem, &u).unwrap_or_default();
+        SpecialPoint { point: Point { tangent, ..special.point.clone() }, ..special.clone() }
+    }
+
+    /// Tells folds from branch points where quantities are held: at a fold the solutions at fixed further parameters turn
+    /// in one of the free parameters.
+    fn tell_folds(&self, system: &System, branch: &Branch, special: &mut SpecialPoint) {
+        /// Slope of a parameter below which the solutions turn. Empirical: the slope is of the order of the error of the
+        /// special point at a fold, and of order 1 at a branch point.
+        const TURNS: f64 = 1e-3;
+        if special.kind != Kind::Fold || system.holds.is_none() {
+            return;
+        }
+        let alone = System { holds: None, ..system.clone() };
+        let all = branch.also.iter().map(|(index, _)| *index).chain([branch.free]);
+        let turns = |index: usize| {
+            let mut problem = problem_of(&alone, index, self.degree, &special.point, false);
+            let u = problem.unknowns_of(&special.point);
+            problem.anchor(&u);
+            direction(&mut *problem, &u).is_ok_and(|along| along.last().is_some_and(|slope| slope.abs() < TURNS))
+        };
+        if !all.into_iter().any(turns) {
+            special.kind = Kind::BranchPoint;
+        }
+    }
+
     fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {
         let ending = match ending {
             Ending::Joined { at, parameter } => Ending::Joined { at, parameter: branch.rounded(parameter) },
@@ -720,6 +834,15 @@ impl Growth<'_> {
         };
         branch.ends[side] = Some(ending.clone());
         self.tell(Event::SideEnded(branch, side, &ending))
+    }
+}
+
+/// A number with eight significant digits.
+fn significant(value: f64) -> String {
+    let size = value.abs().log10().floor();
+    match (-4.0..8.0).contains(&size) {
+        true => format!("{value:.*}", (7.0 - size) as usize),
+        false => format!("{value:.7e}"),
     }
 }
 

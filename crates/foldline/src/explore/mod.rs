@@ -39,6 +39,7 @@ mod discovery;
 pub mod family;
 pub mod given;
 pub mod growth;
+mod holds;
 pub mod homotopy;
 mod interrupt;
 pub mod known;

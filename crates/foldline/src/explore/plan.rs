@@ -3,6 +3,8 @@
 use crate::attractors::Limits;
 use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
+use crate::special::on_levels::Level;
+use crate::special::quantity::Quantity;
 
 /// Attractor that a seed means, among those that count as reached when the search ended: once every type requested by
 /// the seeds with the same sample was found ([`crate::attractors::survey_until`]).
@@ -110,10 +112,24 @@ pub struct BranchPlan {
     pub until: Option<f64>,
     /// Special points at which to switch branches.
     pub switching: Switching,
-    /// Values to mark, or to stop at, on the branch and on those switched to from it.
+    /// Values to mark, or to stop at, and peaks, on the branch and on those switched to from it.
     pub marks: Vec<Mark>,
     /// Limit on the number of points per side.
     pub max_points: usize,
+    /// Held quantities, and the further parameters that are solved for.
+    pub holds: Holds,
+}
+
+/// Quantities held along a branch, and as many further free parameters.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Holds {
+    /// The parameters, by index, and the range of each.
+    pub others: Vec<(usize, Option<[f64; 2]>)>,
+    /// The quantities. A value that is NaN stands for that of the start.
+    pub levels: Vec<Level>,
+    /// Value of the parent's parameter next to which the start is sought, where several points of the parent have the
+    /// values of the quantities.
+    pub near: Option<f64>,
 }
 
 /// A bifurcation curve in two parameters.
@@ -239,6 +255,8 @@ pub struct Plan {
     pub surveys: Vec<SurveyPlan>,
     /// Stepped sweeps by simulation.
     pub sweeps: Vec<SweepPlan>,
+    /// Further columns of tables and exports: names and quantities.
+    pub record: Vec<(String, Quantity)>,
 }
 
 impl Plan {
@@ -256,6 +274,7 @@ impl Plan {
             explorations: Vec::new(),
             surveys: Vec::new(),
             sweeps: Vec::new(),
+            record: Vec::new(),
         }
     }
 }

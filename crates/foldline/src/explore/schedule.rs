@@ -127,6 +127,7 @@ mod tests {
             random: 1,
         });
         let branch = |seed: usize, depth: usize| BranchPlan {
+            holds: Default::default(),
             name: seed.to_string(),
             start: Start::Seed(seed),
             free: 0,

@@ -182,7 +182,17 @@ pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: us
     let (seeds, free, range) = (vec![seed.clone()], 0, [f64::NEG_INFINITY, f64::INFINITY]);
     let (switching, marks) = Default::default();
     let start = Start::Seed(0);
-    let branch = BranchPlan { name: String::new(), start, free, range, until: None, switching, marks, max_points: 0 };
+    let branch = BranchPlan {
+        holds: Default::default(),
+        name: String::new(),
+        start,
+        free,
+        range,
+        until: None,
+        switching,
+        marks,
+        max_points: 0,
+    };
     let plan = Plan { seeds, branches: vec![branch], ..Plan::empty(tolerance, DEGREE) };
     Seeds::new(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
 }

@@ -1,6 +1,6 @@
 //! A vector field with the data needed to explore it.
 
-use super::plan::{ExplorePlan, Plan};
+use super::plan::{BranchPlan, ExplorePlan, Holds, Plan};
 use super::sizes;
 use crate::attractors::Limits;
 use crate::contract::{Batch, Parameters, VectorField};
@@ -8,6 +8,7 @@ use crate::diagram::{Diagram, Family, Measure, Shown, Solution};
 use crate::model::Model;
 use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
+use crate::special::harmonics::Signal;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::Unfolded;
 
@@ -31,6 +32,10 @@ pub struct System<'a> {
     /// Coordinate reflections under which the field is equivariant, the identity first; for a forced field also those
     /// under which it is equivariant half a forcing period later.
     pub reflections: Vec<Vec<bool>>,
+    /// Quantities held along the branch that is followed, with the further free parameters.
+    pub(super) holds: Option<&'a Holds>,
+    /// Names of states and outputs, for messages.
+    pub(super) channel_names: Vec<String>,
     /// The field with its unfolding amplitude, for curves of branch points of cycles.
     pub(super) unfolded: Option<&'a Unfolded<'a>>,
     /// For a forced field and each of these: true if it is equivariant at the same time, and half a period later.
@@ -55,6 +60,8 @@ impl<'a> System<'a> {
             limits: Limits::default(),
             whirl: None,
             reflections: vec![vec![false; n]],
+            holds: None,
+            channel_names: Vec::new(),
             unfolded: None,
             mirrors: Vec::new(),
         }
@@ -71,6 +78,7 @@ impl<'a> System<'a> {
     /// Returns the system without symmetries; states are scaled by the magnitudes met from these places.
     fn measured(model: &'a Model, plan: &Plan, places: &[sizes::Place]) -> System<'a> {
         let scales = sizes::of_states(model, places);
+        let channels = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         System {
             state_names: model.states.iter().map(|s| s.name.clone()).collect(),
             parameter_scales: System::sized(model, plan),
@@ -78,6 +86,7 @@ impl<'a> System<'a> {
             scales,
             limits: plan.limits,
             whirl: model.whirl,
+            channel_names: channels.cloned().collect(),
             ..System::new(model)
         }
     }
@@ -144,13 +153,22 @@ impl<'a> System<'a> {
             | Quantity::Rms(k) => state(k),
             Quantity::Norm(_) => self.scales.iter().fold(0.0, |most, scale| scale.max(most)),
             Quantity::Integral(_) => 1.0,
-            Quantity::Period => 0.0,
+            Quantity::Period | Quantity::Frequency => 0.0,
+            Quantity::Of(term) if !quantity.is_phase() => match term.signal {
+                Signal::Channel(k) => state(k),
+                Signal::Pair(u, v) => state(u).max(state(v)),
+            },
+            Quantity::Of(_) | Quantity::Difference(..) => 360.0 / std::f64::consts::TAU,
+            Quantity::Decibels(_) | Quantity::Ratio(..) | Quantity::RatioDecibels(..) => 1.0,
         }
     }
 
     /// Adopts the scales in which the tangents of a diagram are stored, so that its branches can be continued.
     pub fn in_units_of(mut self, diagram: &Diagram) -> System<'a> {
         for branch in diagram.branches.iter().filter(|branch| !branch.points.is_empty()) {
+            for (index, unit) in &branch.also {
+                self.parameter_scales.iter_mut().skip(*index).take(1).for_each(|own| *own = *unit);
+            }
             let held = branch.held.map(|(_, first)| first);
             for (index, unit) in held.into_iter().chain([branch.free]).zip(&branch.units[usize::from(held.is_none())..])
             {
@@ -303,6 +321,7 @@ fn widths(model: &Model, plan: &Plan) -> Vec<f64> {
     };
     for branch in &plan.branches {
         reaches(branch.free, branch.range);
+        branch.holds.others.iter().for_each(|(other, range)| range.iter().for_each(|range| reaches(*other, *range)));
     }
     for curve in &plan.curves {
         reaches(curve.free, curve.ranges[1]);
@@ -342,6 +361,11 @@ fn away(plan: &Plan, seed: &[f64]) -> Vec<f64> {
         changed.for_each(|(target, goal)| place[*target] = between([seed[*target], *goal]));
     }
     plan.curves.iter().for_each(|curve| place[curve.free] = between(curve.ranges[1]));
+    let others = |branch: &BranchPlan| branch.holds.others.clone();
+    for (other, range) in plan.branches.iter().flat_map(others) {
+        // A parameter that is zero at the seed may be zero for symmetry.
+        place[other] = range.map_or_else(|| 1.1 * place[other] + 0.01, between);
+    }
     plan.branches.iter().for_each(|branch| place[branch.free] = between(branch.range));
     place
 }

@@ -42,6 +42,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
     let source = SeedSource::State(vec![0.68]);
     let seed = SeedPlan { name: "at 1".into(), source, parameters: vec![1.0], samples: 1, random: 1 };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "rest".into(),
         start: Start::Seed(0),
         free: 0,
@@ -63,6 +64,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        record: Vec::new(),
     };
     let archive = Archive { keeps, points: Mutex::new(Vec::new()) };
     let diagram = run(&System::of(&model, &[1.0]), &plan, 1, Diagram::default(), &archive);
@@ -105,6 +107,7 @@ fn pitchfork_plan(switching: Switching) -> Plan {
     let source = SeedSource::State(vec![0.0]);
     let seed = SeedPlan { name: "at 1".into(), source, parameters: vec![1.0], samples: 1, random: 1 };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "rest".into(),
         start: Start::Seed(0),
         free: 0,
@@ -164,6 +167,7 @@ fn the_last_step_lands_on_the_bound() {
     let source = SeedSource::Attractor(AttractorKey::Cycle);
     let seed = SeedPlan { name: "at 1".into(), source, parameters: vec![1.0], samples: 4, random: 1 };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "circle".into(),
         range: [0.4, 7.3],
         ..pitchfork_plan(Switching::default()).branches[0].clone()
@@ -224,8 +228,7 @@ fn special_points_and_endings_are_kept_when_a_branch_is_resumed() {
 fn a_mark_at_the_start_is_there_once_wherever_the_run_was_interrupted() {
     let model = pitchforks();
     let mut plan = pitchfork_plan(Switching::default());
-    plan.branches[0].marks =
-        [1.0, 2.5].map(|value| Mark { quantity: Quantity::Parameter(0), value, stop: false }).to_vec();
+    plan.branches[0].marks = [1.0, 2.5].map(|value| Mark::at(Quantity::Parameter(0), value, false)).to_vec();
     let system = System::of_plan(&model, &plan);
     let marked = |earlier: Diagram| -> Vec<f64> {
         let branch = run(&system, &plan, 1, earlier, &Unobserved).branches.remove(0);
@@ -273,6 +276,7 @@ fn no_census_begins_once_the_observer_has_asked_to_stop() {
     });
     let like = pitchfork_plan(Switching::default()).branches[0].clone();
     let branches = (0..3).map(|k| BranchPlan {
+        holds: Default::default(),
         name: format!("from {k}"),
         start: Start::Seed(k),
         range: [0.4, 7.3],

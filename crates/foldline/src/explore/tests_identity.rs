@@ -39,6 +39,7 @@ fn seed(source: SeedSource, parameters: &[f64], samples: usize) -> SeedPlan {
 
 fn branch(range: [f64; 2], depth: &[(Kind, usize)]) -> BranchPlan {
     BranchPlan {
+        holds: Default::default(),
         name: "branch".into(),
         start: Start::Seed(0),
         free: 0,

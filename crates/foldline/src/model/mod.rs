@@ -139,6 +139,8 @@ struct Inner {
     directional: Tapes<(usize, bool, Branch)>,
     switch_derivatives: Tapes<Vec<usize>>,
     condition_tapes: boundary::ConditionTapes,
+    output_derivatives: Tapes<Vec<usize>>,
+    period_derivatives: Tapes<()>,
 }
 
 /// Branch of f.
@@ -213,6 +215,8 @@ impl Model {
             directional: RwLock::default(),
             switch_derivatives: RwLock::default(),
             condition_tapes: Default::default(),
+            output_derivatives: RwLock::default(),
+            period_derivatives: RwLock::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         let wrong = model.wrong_period().or_else(|| iterated::switched(&model)).or_else(|| boundary::switched(&model));
@@ -338,6 +342,29 @@ impl Model {
         })
     }
 
+    /// The outputs and their derivatives, as [`VectorField::linearise_outputs`] orders them.
+    fn output_tape(&self, free: &[usize]) -> Arc<Tape> {
+        cached(&self.inner.output_derivatives, free.to_vec(), || {
+            let Compiled { graph, outputs, .. } = &self.inner.compiled;
+            let mut graph = graph.clone();
+            let moving = self.leaves(free);
+            let columns: Vec<Vec<graph::Id>> = moving.map(|leaf| column(&mut graph, outputs, leaf)).collect();
+            let in_time = column(&mut graph, outputs, Leaf::Time);
+            let (gx, gp) = columns.split_at(self.states.len());
+            Tape::new(&graph, &[outputs, &rows(gx, outputs.len()), &rows(gp, outputs.len()), &in_time])
+        })
+    }
+
+    /// Derivatives of the forcing period in all parameters.
+    fn period_tape(&self, period: graph::Id) -> Arc<Tape> {
+        cached(&self.inner.period_derivatives, (), || {
+            let mut graph = self.inner.compiled.graph.clone();
+            let each = (0..self.parameters.len()).map(|k| Leaf::Parameter(k as u32));
+            let slopes: Vec<graph::Id> = each.flat_map(|leaf| column(&mut graph, &[period], leaf)).collect();
+            Tape::new(&graph, &[&slopes])
+        })
+    }
+
     /// The states, then some parameters.
     fn leaves(&self, free: &[usize]) -> impl Iterator<Item = Leaf> {
         let states = (0..self.states.len()).map(|j| Leaf::State(j as u32));
@@ -418,6 +445,16 @@ impl VectorField for Model {
         unit[0]
     }
 
+    fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut slopes = vec![0.0; parameters.len()];
+        if let Some(period) = self.inner.compiled.period {
+            let at =
+                Batch { lanes: 1, states: &[], parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
+            self.period_tape(period).run(at, &[], &mut [&mut slopes]);
+        }
+        slopes
+    }
+
     fn periods(&self) -> &[f64] {
         &self.inner.periods
     }
@@ -487,6 +524,12 @@ impl VectorField for Model {
     fn outputs(&self, at: Batch, out: &mut [f64]) {
         self.inner.outputs.run(at, &[], &mut [out]);
     }
+
+    fn linearise_outputs(&self, at: Batch, free: &[usize], mut to: [&mut [f64]; 4]) -> bool {
+        self.output_tape(free).run(at, &[], &mut to);
+        true
+    }
+
     fn switch_count(&self) -> usize {
         self.inner.switches.count
     }

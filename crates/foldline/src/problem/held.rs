@@ -301,6 +301,11 @@ impl ZeroProblem for Held<'_> {
         self.surface.mesh()
     }
 
+    fn is_switched(&self) -> bool {
+        // Bifurcation curves are located by their own conditions.
+        self.condition.kind() == Kind::Mark && self.surface.is_switched()
+    }
+
     fn has_multipliers(&self) -> bool {
         self.surface.has_multipliers()
     }

@@ -3,6 +3,7 @@
 
 use crate::contract::{Monitor, Sight};
 use crate::diagram::{Kind, Point, Solution};
+use num_complex::Complex64;
 
 /// Parameter component of the tangent.
 pub struct Fold;
@@ -29,7 +30,7 @@ impl Monitor for Fold {
     }
 
     fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
-        Some(Box::new(Passage))
+        Some(Box::new(Passage { symmetric: false }))
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {
@@ -39,7 +40,21 @@ impl Monitor for Fold {
 
 /// Multiplier passing 1 (eigenvalue passing 0): the fold of a branch whose parameter slope is lost in rounding, as in a
 /// canard explosion.
-struct Passage;
+pub(super) struct Passage {
+    /// True if a continuous symmetry fixes a multiplier at 1, which then does not count.
+    pub symmetric: bool,
+}
+
+impl Passage {
+    fn spectrum(&self, at: &Point) -> Vec<Complex64> {
+        let mut all = at.free_spectrum().to_vec();
+        let neutral = at.neutral_multiplier().filter(|_| self.symmetric);
+        if let Some(own) = neutral.and_then(|neutral| all.iter().position(|z| *z == neutral)) {
+            all.remove(own);
+        }
+        all
+    }
+}
 
 impl Monitor for Passage {
     fn kind(&self) -> Kind {
@@ -47,13 +62,13 @@ impl Monitor for Passage {
     }
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        super::distance_product(at.free_spectrum(), critical(at))
+        super::distance_product(&self.spectrum(at), critical(at))
     }
 
     fn confirms(&self, at: &Point) -> bool {
         /// Largest distance of the critical multiplier from 1 (eigenvalue from 0). Empirical, as at branch points.
         const NEAR: f64 = 1e-2;
-        at.free_spectrum().iter().any(|z| (z - critical(at)).norm() < NEAR)
+        self.spectrum(at).iter().any(|z| (z - critical(at)).norm() < NEAR)
     }
 
     fn jump(&self) -> usize {

@@ -24,7 +24,9 @@ pub mod connection;
 pub mod cycle_coefficients;
 pub mod cycle_form;
 pub mod fold;
+pub mod gradient;
 pub mod grazing;
+pub mod harmonics;
 pub mod hopf;
 pub mod map_form;
 mod map_operator;
@@ -34,8 +36,10 @@ pub mod on_branch_points;
 pub mod on_cycle_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
+pub mod on_levels;
 pub mod on_maps;
 pub mod on_surfaces;
+pub mod peak;
 pub mod period_doubling;
 pub mod quantity;
 pub mod sliding;
@@ -57,6 +61,15 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
             .collect(),
         Family::Arc => both.into(),
     }
+}
+
+/// Monitors along a branch on which quantities are held, in several parameters: a turning point of one of them is no
+/// bifurcation, so the spectrum alone decides. Folds and branch points are told apart afterwards.
+pub fn monitors_of_held_quantities(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
+    let mut all = monitors(family, symmetric);
+    all.retain(|monitor| !matches!(monitor.kind(), Kind::Fold | Kind::BranchPoint));
+    all.insert(0, Box::new(fold::Passage { symmetric }));
+    all
 }
 
 /// Monitors along a curve of bifurcation points of kind `held`: codimension-two points, and turning points in the

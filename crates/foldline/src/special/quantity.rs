@@ -1,5 +1,7 @@
 //! Named scalar quantities of the points of a branch.
 
+use super::gradient;
+use super::harmonics::{Measured, Signal, Term};
 use crate::contract::VectorField;
 use crate::diagram::{Point, Solution};
 use crate::model::Model;
@@ -11,6 +13,8 @@ pub enum Quantity {
     Parameter(usize),
     /// Period of a cycle; undefined for equilibria.
     Period,
+    /// 1/period of a cycle; undefined for equilibria.
+    Frequency,
     /// Smallest value of a state or output over the solution.
     Smallest(usize),
     /// Largest value of a state or output over the solution.
@@ -28,6 +32,16 @@ pub enum Quantity {
     At(usize, u64),
     /// Root mean square of the state vector, ((1/T) ∫ Σ x_i² dt)^½, for the given number of states.
     Norm(usize),
+    /// Amplitude or phase of a harmonic.
+    Of(Term),
+    /// 20 log₁₀ of a value.
+    Decibels(Term),
+    /// Ratio of two values.
+    Ratio(Term, Term),
+    /// 20 log₁₀ of a ratio.
+    RatioDecibels(Term, Term),
+    /// Difference of two phases, in degrees from -180 to 180.
+    Difference(Term, Term),
 }
 
 /// State at an iterate of a cycle of a map.
@@ -49,13 +63,20 @@ const ENDINGS: [(&str, Made); 5] = [
     ("_integral", Quantity::Integral),
 ];
 
+/// Decibels of a value.
+pub(super) fn decibels(value: f64) -> f64 {
+    20.0 * value.abs().log10()
+}
+
 impl Quantity {
-    /// Value at a point, if it is defined there.
+    /// Value at a point, if it is defined there and follows from the numbers of the point alone. Harmonics need
+    /// [`Quantity::on`].
     pub fn of(self, point: &Point) -> Option<f64> {
         let average = |k: usize, power: usize| point.averages.get(k).map(|average| average[power]);
         match self {
             Quantity::Parameter(k) => point.parameters.get(k).copied(),
             Quantity::Period => point.solution.period(),
+            Quantity::Frequency => point.solution.period().map(|period| 1.0 / period),
             Quantity::Smallest(k) => point.ranges.get(k).map(|range| range[0]),
             Quantity::Largest(k) => point.ranges.get(k).map(|range| range[1]),
             Quantity::Iterate(k, number) => iterate(point, k, number),
@@ -75,12 +96,106 @@ impl Quantity {
                 let squares = point.averages.get(..n).filter(|own| !own.is_empty())?;
                 Some(squares.iter().map(|own| own[1]).sum::<f64>().max(0.0).sqrt())
             }
+            Quantity::Of(_)
+            | Quantity::Decibels(_)
+            | Quantity::Ratio(..)
+            | Quantity::RatioDecibels(..)
+            | Quantity::Difference(..) => None,
         }
     }
 
-    /// Returns the quantity with the given name: a parameter, `period`, `norm`, or NAME_max, NAME_min, NAME_mean,
-    /// NAME_rms or NAME_integral of a state or output. For a boundary-value problem also NAME@0, NAME@1 or NAME@0.5, the
-    /// value of a state at a place relative to the length of the interval.
+    /// Value at a point with its profile, if it is defined there.
+    pub fn on(self, point: &Point, field: &dyn VectorField) -> Option<f64> {
+        let value = |term: Term| match term.measured {
+            Measured::Largest => Quantity::Largest(term.signal.single()?).of(point),
+            Measured::Smallest => Quantity::Smallest(term.signal.single()?).of(point),
+            Measured::Mean => Quantity::Mean(term.signal.single()?).of(point),
+            Measured::Rms => Quantity::Rms(term.signal.single()?).of(point),
+            Measured::Amplitude(_) | Measured::Phase(_) => gradient::harmonic(field, point, term),
+        };
+        match self {
+            // Without forcing the phase of a cycle is arbitrary.
+            Quantity::Of(_) if self.is_phase() && point.solution.forcing_periods() == 0 => None,
+            Quantity::Of(term) => value(term),
+            Quantity::Decibels(term) => value(term).map(decibels),
+            Quantity::Ratio(a, b) => Some(value(a)? / value(b)?),
+            Quantity::RatioDecibels(a, b) => Some(decibels(value(a)? / value(b)?)),
+            Quantity::Difference(a, b) => Some(wrapped(value(a)? - value(b)?)),
+            other => other.of(point),
+        }
+    }
+
+    /// Name of the quantity, given those of states and outputs; parameters and norms are not named.
+    pub fn name(self, channels: &[String]) -> String {
+        let own = |k: usize| channels.get(k).cloned().unwrap_or_else(|| format!("x{}", k + 1));
+        match self {
+            Quantity::Parameter(_) => "the parameter".into(),
+            Quantity::Period => "period".into(),
+            Quantity::Frequency => "frequency".into(),
+            Quantity::Norm(_) => "norm".into(),
+            Quantity::Smallest(k) => format!("{}_min", own(k)),
+            Quantity::Largest(k) => format!("{}_max", own(k)),
+            Quantity::Mean(k) => format!("{}_mean", own(k)),
+            Quantity::Rms(k) => format!("{}_rms", own(k)),
+            Quantity::Integral(k) => format!("{}_integral", own(k)),
+            Quantity::Iterate(k, _) => own(k),
+            Quantity::At(k, place) => format!("{}@{}", own(k), f64::from_bits(place)),
+            Quantity::Of(a) => a.name(channels),
+            Quantity::Decibels(a) => format!("{}_dB", a.name(channels)),
+            Quantity::Ratio(a, b) => format!("{}/{}", a.name(channels), b.name(channels)),
+            Quantity::RatioDecibels(a, b) => format!("{}/{}_dB", a.name(channels), b.name(channels)),
+            Quantity::Difference(a, b) => format!("{}-{}", a.name(channels), b.name(channels)),
+        }
+    }
+
+    /// True if the quantity is an angle in degrees, equal to its value plus 360.
+    pub fn is_phase(self) -> bool {
+        match self {
+            Quantity::Of(term) => matches!(term.measured, Measured::Phase(_)),
+            Quantity::Difference(..) => true,
+            _ => false,
+        }
+    }
+
+    /// True if the quantity needs the profile of a point.
+    pub fn needs_profile(self) -> bool {
+        self.terms().next().is_some()
+    }
+
+    /// Unit of the quantity; empty if it has none of its own.
+    pub fn unit(self, model: &Model) -> &str {
+        let of = |term: Term| match (term.measured, term.signal) {
+            (Measured::Phase(_), _) => "deg",
+            (_, Signal::Channel(k) | Signal::Pair(k, _)) => model.channel_unit(k),
+        };
+        match self {
+            Quantity::Parameter(k) => model.parameters.get(k).map_or("", |own| &own.unit),
+            Quantity::Period => &model.time,
+            Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => {
+                model.channel_unit(k)
+            }
+            Quantity::Iterate(k, _) | Quantity::At(k, _) => model.channel_unit(k),
+            Quantity::Of(term) => of(term),
+            Quantity::Difference(..) => "deg",
+            Quantity::Decibels(_) | Quantity::RatioDecibels(..) => "dB",
+            Quantity::Frequency | Quantity::Integral(_) | Quantity::Norm(_) | Quantity::Ratio(..) => "",
+        }
+    }
+
+    /// The terms of which the quantity is made.
+    pub fn terms(self) -> impl Iterator<Item = Term> {
+        let (a, b) = match self {
+            Quantity::Of(a) | Quantity::Decibels(a) => (Some(a), None),
+            Quantity::Ratio(a, b) | Quantity::RatioDecibels(a, b) | Quantity::Difference(a, b) => (Some(a), Some(b)),
+            _ => (None, None),
+        };
+        a.into_iter().chain(b)
+    }
+
+    /// Returns the quantity with the given name: a parameter, `period`, `frequency`, `norm`; NAME_max, NAME_min,
+    /// NAME_mean, NAME_rms or NAME_integral of a state or output; NAME_h1 or NAME_h1_phase of a harmonic, a ratio A/B,
+    /// a difference of phases A - B, or one of these followed by `_dB`. For a boundary-value problem also NAME@0, NAME@1 or
+    /// NAME@0.5, the value of a state at a place relative to the length of the interval.
     pub fn named(name: &str, model: &Model) -> Option<Quantity> {
         if let Some(index) = model.parameter_index(name) {
             return Some(Quantity::Parameter(index));
@@ -95,12 +210,13 @@ impl Quantity {
         let ended = || ENDINGS.iter().find_map(|(ending, made)| Some(made(channel(name.strip_suffix(ending)?)?)));
         match name {
             "period" => Some(Quantity::Period),
+            "frequency" => Some(Quantity::Frequency),
             "norm" => Some(Quantity::Norm(model.states.len())),
-            _ => ended(),
+            _ => ended().or_else(|| made_of_terms(name, model)),
         }
     }
 
-    /// All names that [`Quantity::named`] accepts.
+    /// All names that [`Quantity::named`] accepts, without harmonics and what is made of two quantities.
     pub fn names(model: &Model) -> Vec<String> {
         let channels = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         let places: &[&str] = if model.conditions() == [0, 0] { &[] } else { &["@0", "@1"] };
@@ -108,6 +224,46 @@ impl Quantity {
         let ends: Vec<String> = ends.collect();
         let ended = channels.flat_map(|name| ENDINGS.map(|(ending, _)| format!("{name}{ending}")));
         let parameters = model.parameters.iter().map(|p| p.name.clone());
-        parameters.chain(["period".into(), "norm".into()]).chain(ended).chain(ends).collect()
+        parameters.chain(["period".into(), "frequency".into(), "norm".into()]).chain(ended).chain(ends).collect()
     }
+}
+
+/// Appends quantities to the averages of a point, after those of its states and outputs, so that what reads the numbers of
+/// points alone shows them. Returns them as quantities of the extended point.
+pub fn append(point: &mut Point, quantities: &[Quantity], model: &Model) {
+    let channels = model.states.len() + model.outputs.len();
+    let values: Vec<f64> = quantities.iter().map(|own| own.on(point, model).unwrap_or(f64::NAN)).collect();
+    point.averages.resize(channels, [f64::NAN; 2]);
+    point.averages.extend(values.into_iter().map(|value| [value, value * value]));
+}
+
+/// Quantity `index` of those appended by [`append`].
+pub fn appended(index: usize, model: &Model) -> Quantity {
+    Quantity::Mean(model.states.len() + model.outputs.len() + index)
+}
+
+/// An angle in degrees from -180 (excluded) to 180.
+pub fn wrapped(degrees: f64) -> f64 {
+    let rest = degrees.rem_euclid(360.0);
+    if rest > 180.0 { rest - 360.0 } else { rest }
+}
+
+fn made_of_terms(name: &str, model: &Model) -> Option<Quantity> {
+    let term = |text: &str| Term::named(text.trim(), model);
+    if let Some(own) = term(name) {
+        return Some(Quantity::Of(own));
+    }
+    let (bare, decibels) = name.strip_suffix("_dB").map_or((name, false), |bare| (bare, true));
+    let level = |own: &Term| !matches!(own.measured, Measured::Phase(_));
+    if decibels && let Some(own) = term(bare).filter(level) {
+        return Some(Quantity::Decibels(own));
+    }
+    if let Some((a, b)) = bare.split_once('/').and_then(|(a, b)| Some((term(a)?, term(b)?))) {
+        let fits = level(&a) && level(&b);
+        return fits.then_some(if decibels { Quantity::RatioDecibels(a, b) } else { Quantity::Ratio(a, b) });
+    }
+    // The order of a harmonic may be negative.
+    let split = |(at, _): (usize, &str)| Some((term(&name[..at])?, term(&name[at + 1..])?));
+    let (a, b) = name.match_indices('-').find_map(split)?;
+    (!level(&a) && !level(&b) && a.order() == b.order()).then_some(Quantity::Difference(a, b))
 }

@@ -217,6 +217,9 @@ fn setting<'a>(system: &'a System, branch: &Branch) -> Setting<'a> {
     let axis = |index: usize| Axis::new(index, system.unit(index));
     let axes = match branch.held {
         Some((_, other)) => vec![axis(other), axis(branch.free)],
+        None if !branch.also.is_empty() => {
+            branch.also.iter().map(|(index, _)| *index).chain([branch.free]).map(axis).collect()
+        }
         None => match branch.points.iter().map(|p| change(&parameters, &p.parameters)).max_by(larger) {
             Some(Some((main, changes))) => {
                 let ties = changes.iter().filter(|(index, _)| *index != main.0).map(|(index, by)| Tie {

@@ -70,6 +70,11 @@ impl Part<'_> {
         Check { branch, position, special: None, parameter, quantity, stated, found }
     }
 
+    /// True if the points are solutions in several free parameters.
+    fn in_several_parameters(&self) -> bool {
+        self.branch.held.is_some() || !self.branch.also.is_empty()
+    }
+
     fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
         Undecided { branch: self.branch.name.clone(), position: point.position, special: None, why }
     }
@@ -121,7 +126,7 @@ impl Part<'_> {
             };
             let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
             let off = shooting.between(orbit, &solved.orbit);
-            if max_abs(&off) > ELSEWHERE[usize::from(self.branch.held.is_some())] {
+            if max_abs(&off) > ELSEWHERE[usize::from(self.in_several_parameters())] {
                 out.undecided.push(self.undecided(point, "shooting converged to another solution"));
                 continue;
             }
@@ -169,7 +174,7 @@ impl Part<'_> {
         let stated = Some(point.trust.spectrum + noise).filter(|stated| stated.is_finite());
         out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
         // The critical multiplier of a bifurcation curve is on neither side of the unit circle.
-        let aside = if self.branch.held.is_some() { HELD } else { 0.0 };
+        let aside = if self.in_several_parameters() { HELD } else { 0.0 };
         let wrong =
             pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0) && (b.norm() - 1.0).abs() >= aside);
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));

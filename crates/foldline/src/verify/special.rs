@@ -37,7 +37,9 @@ const AGREEING: f64 = 0.2;
 pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Verified {
     let mut out = Verified::default();
     let [accuracy, _] = accuracies(tolerance);
-    for special in branch.special.iter().filter(|special| !matches!(special.kind, Kind::Unexplained | Kind::Mark)) {
+    for special in
+        branch.special.iter().filter(|special| !matches!(special.kind, Kind::Unexplained | Kind::Mark | Kind::Peak))
+    {
         let undecided = |why| Undecided {
             branch: branch.name.clone(),
             position: special.point.position,

@@ -33,6 +33,7 @@ fn computed(model: &Model) -> Diagram {
         random: 1,
     };
     let branch = BranchPlan {
+        holds: Default::default(),
         name: "rest".into(),
         start: Start::Seed(0),
         free: 0,
@@ -54,6 +55,7 @@ fn computed(model: &Model) -> Diagram {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        record: Vec::new(),
     };
     run(&System::of(model, &[-0.5, 2.0]), &plan, 1, Diagram::default(), &Unobserved)
 }
