@@ -26,6 +26,7 @@
 mod accounts;
 mod arrival;
 mod averaged;
+mod axis;
 mod choice;
 mod corner;
 mod counted;
@@ -62,6 +63,7 @@ mod tests;
 #[cfg(test)]
 mod tests_identity;
 
+pub use axis::axis_of;
 pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};

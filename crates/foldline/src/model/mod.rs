@@ -135,6 +135,15 @@ struct Inner {
     linear: Tapes<(Vec<usize>, Branch)>,
     directional: Tapes<(usize, bool, Branch)>,
     switch_derivatives: Tapes<Vec<usize>>,
+    /// Derivatives of the outputs and of the forcing period along a direction.
+    moving: Tapes<Moving>,
+}
+
+/// What a derivative along a direction is taken of, besides f.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Moving {
+    Outputs,
+    Period,
 }
 
 /// Branch of f.
@@ -196,6 +205,7 @@ impl Model {
             linear: RwLock::default(),
             directional: RwLock::default(),
             switch_derivatives: RwLock::default(),
+            moving: RwLock::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         let wrong = model.wrong_period().or_else(|| iterated::switched(&model));
@@ -318,6 +328,24 @@ impl Model {
             let in_time = column(&mut graph, switches, Leaf::Time);
             let (hx, hp) = columns.split_at(self.states.len());
             Tape::new(&graph, &[switches, &rows(hx, *count), &rows(hp, *count), &in_time])
+        })
+    }
+
+    /// Derivative of the outputs or of the forcing period along a direction in states and parameters.
+    fn moving_tape(&self, what: Moving) -> Arc<Tape> {
+        cached(&self.inner.moving, what, || {
+            let Compiled { graph, outputs, period, .. } = &self.inner.compiled;
+            let roots: Vec<graph::Id> = match what {
+                Moving::Outputs => outputs.clone(),
+                Moving::Period => period.iter().copied().collect(),
+            };
+            let (mut graph, states) = (graph.clone(), self.states.len() as u32);
+            let derivative = graph.derivative(&roots, |graph, leaf| match leaf {
+                Leaf::State(j) => Some(graph.leaf(Leaf::Direction(0, j))),
+                Leaf::Parameter(k) => Some(graph.leaf(Leaf::Direction(0, states + k))),
+                _ => None,
+            });
+            Tape::new(&graph, &[&derivative])
         })
     }
 
@@ -470,6 +498,24 @@ impl VectorField for Model {
     fn outputs(&self, at: Batch, out: &mut [f64]) {
         self.inner.outputs.run(at, &[], &mut [out]);
     }
+
+    fn outputs_along(&self, at: Batch, direction: &[f64], out: &mut [f64]) {
+        self.moving_tape(Moving::Outputs).run(at, &[direction], &mut [out]);
+    }
+
+    fn time_unit_along(&self, parameters: &[f64], change: &[f64]) -> f64 {
+        if self.inner.period.is_none() {
+            return 0.0;
+        }
+        // The period does not depend on the states.
+        let direction = [&vec![0.0; self.dim()][..], change].concat();
+        let states = vec![0.0; self.dim()];
+        let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(parameters), times: &[0.0], signs: &[] };
+        let mut slope = [0.0];
+        self.moving_tape(Moving::Period).run(at, &[&direction], &mut [&mut slope]);
+        slope[0]
+    }
+
     fn switch_count(&self) -> usize {
         self.inner.switches.count
     }
