@@ -3,13 +3,16 @@
 mod columns;
 mod format;
 mod responses;
+mod sensitivity;
+
+pub use sensitivity::found;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
-use foldline::model::Model;
+use foldline::model::{Model, Spread};
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::{Part, load_part};
@@ -78,7 +81,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let part = match typed.what() {
         What::Points | What::Branches => Part::Numbers,
         What::Special | What::Responses | What::Notes => Part::Special,
+        What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
+    if !typed.of.is_empty() {
+        return Err(Failure::typed("--of applies to --sensitivities and --uncertainty", "leave it out"));
+    }
     let run = read(&typed.folder, part)?;
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let conversion = conversion(&run.model, &typed.unit)?;
@@ -91,6 +98,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special => columns::special(diagram, model, &kept),
         What::Responses => responses::responses(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
+        What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
     write(&table, typed.format, &mut out)?;
@@ -155,6 +163,10 @@ pub struct Run {
     pub diagram: Diagram,
     /// Subject of each remark, and the remark.
     pub notes: Vec<(String, String)>,
+    /// Uncertain parameters, by index.
+    pub spreads: Vec<(usize, Spread)>,
+    /// True if the study asks for uncertainty in plots.
+    pub uncertainty: bool,
 }
 
 /// Reads as much of the run in a folder as `part` asks for.
@@ -168,7 +180,8 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
     // Remarks on one subject stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
-    Ok(Run { model: study.model, plan: study.plan, diagram, notes })
+    let (spreads, uncertainty) = (study.spreads, study.uncertainty);
+    Ok(Run { model: study.model, plan: study.plan, diagram, notes, spreads, uncertainty })
 }
 
 /// Selects the branches meant by a name given on the command line; all of them without a name.

@@ -4,7 +4,7 @@
 //! reported with its line and column in the file. The format is described in docs/book/model-files.md.
 
 mod functions;
-mod items;
+pub(crate) mod items;
 mod mass;
 mod repeat;
 mod rotor;

@@ -52,7 +52,7 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State, Total,
+    Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, Spread, State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;

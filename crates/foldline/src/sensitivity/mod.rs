@@ -29,13 +29,15 @@
 //! **Fails when** the defining system is singular: at points of codimension two, and where the solution is not isolated.
 
 mod extremes;
+pub mod listed;
 mod routes;
 #[cfg(test)]
 mod tests;
 pub mod uncertainty;
 
 pub use extremes::Extreme;
-pub use uncertainty::{Band, Spread, Uncertainty, uncertainty};
+pub use crate::model::Spread;
+pub use uncertainty::{Band, Uncertainty, uncertainty};
 
 use crate::diagram::{Branch, Kind, Point, SpecialPoint};
 use crate::explore::plan::Plan;

@@ -22,32 +22,22 @@ use crate::attractors::SplitMix64;
 use crate::diagram::{Branch, Kind, SpecialPoint};
 use crate::explore::System;
 use crate::explore::plan::Plan;
+use crate::model::Spread;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// Distribution of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Spread {
-    /// Normal about the value of the parameter, with this standard deviation.
-    Normal(f64),
-    /// Uniform between two values.
-    Uniform([f64; 2]),
+/// Mean and standard deviation of a parameter with the given value.
+fn moments_of(spread: Spread, value: f64) -> [f64; 2] {
+    match spread {
+        Spread::Normal(sigma) => [value, sigma],
+        Spread::Uniform([low, high]) => [0.5 * (low + high), (high - low) / 12.0f64.sqrt()],
+    }
 }
 
-impl Spread {
-    /// Mean and standard deviation of a parameter with the given value.
-    fn moments(self, value: f64) -> [f64; 2] {
-        match self {
-            Spread::Normal(sigma) => [value, sigma],
-            Spread::Uniform([low, high]) => [0.5 * (low + high), (high - low) / 12.0f64.sqrt()],
-        }
-    }
-
-    fn quantile(self, value: f64, share: f64) -> f64 {
-        match self {
-            Spread::Normal(sigma) => value + sigma * normal_quantile(share),
-            Spread::Uniform([low, high]) => low + share * (high - low),
-        }
+fn quantile_of(spread: Spread, value: f64, share: f64) -> f64 {
+    match spread {
+        Spread::Normal(sigma) => value + sigma * normal_quantile(share),
+        Spread::Uniform([low, high]) => low + share * (high - low),
     }
 }
 
@@ -104,7 +94,7 @@ pub fn uncertainty(
         }
         let bands = sensitivities.rows.iter().enumerate().map(|(r, row)| {
             let each = spreads.iter().map(|(index, spread)| {
-                let [mean, sigma] = spread.moments(base.parameters[*index]);
+                let [mean, sigma] = moments_of(*spread, base.parameters[*index]);
                 let column = posed.parameters.iter().position(|own| own == index).unwrap_or(0);
                 let slope = row.by[column].as_ref().map_err(Clone::clone)?.value;
                 Ok([slope * (mean - base.parameters[*index]), slope * sigma])
@@ -139,7 +129,7 @@ fn hypercube(base: &Base, spreads: &[(usize, Spread)], samples: usize) -> Vec<Ve
         .map(|(index, spread)| {
             let value = base.parameters[*index];
             let share = |k: usize| (k as f64 + 0.5) / samples as f64;
-            let mut column: Vec<f64> = (0..samples).map(|k| spread.quantile(value, share(k)) - value).collect();
+            let mut column: Vec<f64> = (0..samples).map(|k| quantile_of(*spread, value, share(k)) - value).collect();
             for k in (1..samples).rev() {
                 column.swap(k, (random.next() % (k as u64 + 1)) as usize);
             }
