@@ -3,6 +3,7 @@
 use crate::bytes::{counted, integers, numbers, parts};
 use crate::failure;
 use crate::saving::save;
+use crate::sensitivity::{Band, Row};
 use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::VectorField;
@@ -14,6 +15,7 @@ use foldline_store::short;
 use foldline_store::study_file::{self, parse_study_of_run};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,13 +27,15 @@ pub struct Diagram {
     /// Subject of each remark, and the remark.
     #[pyo3(get)]
     pub notes: Vec<(String, String)>,
+    /// True if quantities are in other units than those of the equations.
+    pub converted: bool,
 }
 
 impl Diagram {
     /// Returns the diagram with its branches in the order of the study.
     pub fn new(diagram: diagram::Diagram, study: Arc<study_file::Study>, notes: Vec<(String, String)>) -> Diagram {
         let diagram = Arc::new(ordered(diagram, &names(&study.plan)));
-        Diagram { diagram, study, notes }
+        Diagram { diagram, study, notes, converted: false }
     }
 
     /// Branch with that index.
@@ -70,7 +74,7 @@ impl Diagram {
         let conversion = Conversion::new(&self.study.model, &units).map_err(refused)?;
         let diagram = Arc::new(conversion.diagram((*self.diagram).clone()));
         let study = study_file::Study { model: conversion.model().clone(), ..(*self.study).clone() };
-        Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone() })
+        Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone(), converted: true })
     }
 
     /// Unreached parts of the study.
@@ -120,7 +124,25 @@ impl Diagram {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
         let diagram = diagram::Diagram { branches: vec![branch], ..diagram::Diagram::default() };
-        Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new() })
+        let (diagram, study) = (Arc::new(diagram), Arc::clone(&self.study));
+        Ok(Diagram { diagram, study, notes: Vec::new(), converted: self.converted })
+    }
+
+    /// Derivatives at a special point, or at a point, of a branch.
+    fn sensitivities(&self, py: Python, branch: usize, special: bool, index: usize) -> PyResult<Vec<Row>> {
+        self.derivatives(py, branch, special, index)
+    }
+
+    /// Distributions of the numbers at a special point for uncertain parameters: standard deviations, or ranges.
+    fn uncertainty(
+        &self,
+        py: Python,
+        branch: usize,
+        index: usize,
+        spreads: HashMap<String, (f64, Option<f64>)>,
+        samples: usize,
+    ) -> PyResult<(Vec<Band>, Vec<(String, usize)>)> {
+        self.distributions(py, branch, index, spreads, samples)
     }
 
     /// Solution at the target of a homotopy.
