@@ -33,7 +33,10 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
             return Err(Failure::typed(message, "export them with --format csv or parquet"));
         }
         if !typed.unit.is_empty() {
-            return Err(Failure::typed("--sensitivities: derivatives are in the units of the model", "leave out --unit"));
+            return Err(Failure::typed(
+                "--sensitivities: derivatives are in the units of the model",
+                "leave out --unit",
+            ));
         }
         let branches: Vec<String> = export.diagram.branches.iter().map(|branch| branch.name.clone()).collect();
         let run = crate::table::read(&typed.folder, Part::Everything)?;

@@ -22,8 +22,7 @@ pub fn write(typed: &Typed, run: &Run, name: &str) -> Result<Outcome, Failure> {
     let (branch, number, kind) = place(typed.at.as_deref(), run)?;
     let all = found(run, &|own| branch.as_ref().is_none_or(|name| own.name == *name));
     let fits = |own: &&Listed<Sensitivities>| {
-        number.is_none_or(|number| own.number + 1 == number)
-            && kind.as_ref().is_none_or(|kind| own.kind.name() == kind)
+        number.is_none_or(|number| own.number + 1 == number) && kind.as_ref().is_none_or(|kind| own.kind.name() == kind)
     };
     let fitting: Vec<&Listed<Sensitivities>> = all.iter().filter(fits).collect();
     let point = fitting.iter().find(|own| own.found.is_ok()).or(fitting.first());
@@ -33,7 +32,8 @@ pub fn write(typed: &Typed, run: &Run, name: &str) -> Result<Outcome, Failure> {
     let sensitivities = match &point.found {
         Ok(found) => found,
         Err(why) => {
-            let message = format!("--tornado: the {} of {} has no sensitivities: {why}", point.kind.title(), point.branch);
+            let message =
+                format!("--tornado: the {} of {} has no sensitivities: {why}", point.kind.title(), point.branch);
             return Err(Failure::typed(message, "choose another special point with --at"));
         }
     };
@@ -123,8 +123,13 @@ fn unit(model: &Model, index: usize) -> String {
 
 /// The special points to choose from.
 fn points(all: &[Listed<Sensitivities>]) -> String {
-    let names: Vec<String> = all.iter().map(|own| format!("{}:{} ({})", own.branch, own.number + 1, own.kind)).collect();
-    if names.is_empty() { "the run has no special points".into() } else { format!("choose one of {}", names.join(", ")) }
+    let names: Vec<String> =
+        all.iter().map(|own| format!("{}:{} ({})", own.branch, own.number + 1, own.kind)).collect();
+    if names.is_empty() {
+        "the run has no special points".into()
+    } else {
+        format!("choose one of {}", names.join(", "))
+    }
 }
 
 fn capital(text: &str) -> String {

@@ -67,7 +67,15 @@ impl Case {
             let off = |own: &SpecialPoint| (own.point.parameters[branch.free] - near).abs();
             let fitting = branch.special.iter().filter(|own| own.kind == *kind);
             let nearest = fitting.min_by(|a, b| off(a).total_cmp(&off(b)));
-            (k, nearest.unwrap_or_else(|| panic!("{name} has no {kind}: {:?}", branch.special.iter().map(|s| (s.kind, s.point.parameters[branch.free])).collect::<Vec<_>>())))
+            (
+                k,
+                nearest.unwrap_or_else(|| {
+                    panic!(
+                        "{name} has no {kind}: {:?}",
+                        branch.special.iter().map(|s| (s.kind, s.point.parameters[branch.free])).collect::<Vec<_>>()
+                    )
+                }),
+            )
         });
         found.collect()
     }
@@ -77,8 +85,7 @@ impl Case {
     fn check(&self) {
         let base = self.ran(None);
         let run = load_part(&base.path().join("run"), Part::Everything).unwrap();
-        let study =
-            parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file).unwrap();
+        let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file).unwrap();
         let system = System::of_plan(&study.model, &study.plan).in_units_of(&run.diagram);
         let found: Vec<Sensitivities> = self
             .points(&run.diagram)

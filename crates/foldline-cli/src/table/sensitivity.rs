@@ -62,8 +62,7 @@ fn check_names(model: &Model, names: &[String]) -> Result<(), Failure> {
     let channels = model.states.iter().map(|own| &own.name).chain(model.outputs.iter().map(|own| &own.name));
     let ends = channels.flat_map(|name| ["min", "max"].map(|end| format!("{name}_{end}")));
     let fixed = ["all", "period", "angle"].map(String::from);
-    let known: Vec<String> =
-        model.parameters.iter().map(|own| own.name.clone()).chain(fixed).chain(ends).collect();
+    let known: Vec<String> = model.parameters.iter().map(|own| own.name.clone()).chain(fixed).chain(ends).collect();
     match names.iter().find(|name| !known.contains(name)) {
         Some(name) => {
             let known: Vec<&str> = known.iter().map(String::as_str).collect();

@@ -249,7 +249,17 @@ fn parse(
         surveys,
         sweeps,
     };
-    Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store, spreads, uncertainty })
+    Ok(Study {
+        file: file.to_string(),
+        text: text.to_string(),
+        model_file,
+        model_text,
+        model,
+        plan,
+        store,
+        spreads,
+        uncertainty,
+    })
 }
 
 /// Reports a model file where a study was expected, with the commands that accept it.
@@ -383,9 +393,7 @@ fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &m
         };
         match model.parameter_index(name) {
             Some(index) => {
-                if let Some(number) =
-                    walk.quantity(value, &what, &model.parameters[index].unit)
-                {
+                if let Some(number) = walk.quantity(value, &what, &model.parameters[index].unit) {
                     values[index] = number;
                 }
             }

@@ -510,7 +510,8 @@ impl VectorField for Model {
         // The period does not depend on the states.
         let direction = [&vec![0.0; self.dim()][..], change].concat();
         let states = vec![0.0; self.dim()];
-        let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(parameters), times: &[0.0], signs: &[] };
+        let at =
+            Batch { lanes: 1, states: &states, parameters: Parameters::Shared(parameters), times: &[0.0], signs: &[] };
         let mut slope = [0.0];
         self.moving_tape(Moving::Period).run(at, &[&direction], &mut [&mut slope]);
         slope[0]

@@ -58,11 +58,7 @@ impl<'a> Held<'a> {
     /// Bifurcations that `condition` defines on a surface with `freedom` free unknowns: parameters, and the amplitude of an
     /// unfolding. Both must be on the same mesh. With two parameters they form a curve; with more, see
     /// [`Held::directions`].
-    pub fn new(
-        surface: Box<dyn ZeroProblem + 'a>,
-        condition: Box<dyn Condition + 'a>,
-        freedom: usize,
-    ) -> Held<'a> {
+    pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>, freedom: usize) -> Held<'a> {
         let (scale, rows) = (vec![1.0; condition.extra()], generic(freedom * surface.unknowns()));
         Held {
             surface,

@@ -64,7 +64,8 @@ pub fn extremes(field: &dyn VectorField, point: &Point) -> Vec<Extreme> {
     match &point.solution {
         Solution::Equilibrium(x) => {
             let values = values(field, &point.parameters, x, &[]);
-            let of = |channel: usize| Extreme { channel, largest: true, value: values[channel], place: Place::Iterate(0) };
+            let of =
+                |channel: usize| Extreme { channel, largest: true, value: values[channel], place: Place::Iterate(0) };
             (0..channels).map(of).collect()
         }
         Solution::Cycle(cycle) if cycle.degree == 0 => of_iterates(field, &point.parameters, cycle),
@@ -116,8 +117,7 @@ pub fn slope(
                 _ => (0..16).map(|k| (k as f64 + 0.37) / 16.0).collect(),
             };
             let all: Vec<f64> = times.iter().map(|t| one(*t)).collect();
-            let (low, high) =
-                all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (v.min(a), v.max(b)));
+            let (low, high) = all.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (v.min(a), v.max(b)));
             let size = along.iter().chain(change).fold(low.abs().max(high.abs()), |most, v| most.max(v.abs()));
             if high - low > 100.0 * SAME * size {
                 return Err(match place {
@@ -278,8 +278,7 @@ impl Interpolant {
     fn through(values: &[f64]) -> Interpolant {
         let halved = |k: usize| if k == 0 || k == DEGREE { 0.5 } else { 1.0 };
         let term = |r: usize, k: usize| halved(k) * values[k] * (PI * (r * k) as f64 / DEGREE as f64).cos();
-        let coefficient =
-            |r: usize| 2.0 / DEGREE as f64 * halved(r) * (0..=DEGREE).map(|k| term(r, k)).sum::<f64>();
+        let coefficient = |r: usize| 2.0 / DEGREE as f64 * halved(r) * (0..=DEGREE).map(|k| term(r, k)).sum::<f64>();
         let coefficients: Vec<f64> = (0..=DEGREE).map(coefficient).collect();
         let mut slopes = vec![0.0; DEGREE + 2];
         for r in (1..=DEGREE).rev() {

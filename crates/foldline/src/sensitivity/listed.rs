@@ -142,11 +142,7 @@ pub struct Entry {
 
 /// Returns the derivatives one by one, of the numbers whose names are wanted; an entry without names where a special point
 /// has none.
-pub fn entries(
-    all: &[Listed<Sensitivities>],
-    model: &Model,
-    wanted: &dyn Fn(Measured, &str) -> bool,
-) -> Vec<Entry> {
+pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Measured, &str) -> bool) -> Vec<Entry> {
     let mut entries = Vec::new();
     for point in all {
         let name = |index: usize| model.parameters.get(index).map_or_else(String::new, |own| own.name.clone());

@@ -35,8 +35,8 @@ mod routes;
 mod tests;
 pub mod uncertainty;
 
-pub use extremes::Extreme;
 pub use crate::model::Spread;
+pub use extremes::Extreme;
 pub use uncertainty::{Band, Uncertainty, uncertainty};
 
 use crate::diagram::{Branch, Kind, Point, SpecialPoint};

@@ -196,7 +196,8 @@ impl<'a> Posed<'a> {
     /// Numbers at a solution and their changes with every parameter.
     pub fn route(&self, base: &Base) -> Result<Route, String> {
         let (axes, count) = (self.axes(), self.parameters.len());
-        let mut problem = self.problem(axes.clone(), &base.parameters).ok_or("points of this kind have no defining system")?;
+        let mut problem =
+            self.problem(axes.clone(), &base.parameters).ok_or("points of this kind have no defining system")?;
         let extras = problem.extras();
         let last = base.u.len() - 1;
         let mut u = base.u[..last].to_vec();
@@ -215,7 +216,8 @@ impl<'a> Posed<'a> {
             parameters: base.parameters.clone(),
             axes,
         };
-        let mut route = Route { values: Vec::new(), slopes: Vec::new(), directions: Vec::new(), departures: Vec::new() };
+        let mut route =
+            Route { values: Vec::new(), slopes: Vec::new(), directions: Vec::new(), departures: Vec::new() };
         let mut found: Option<Vec<Extreme>> = None;
         for (index, direction) in self.parameters.iter().zip(directions) {
             let at = problem.point(&u, &direction, Examination::default());
@@ -320,11 +322,7 @@ impl<'a> Posed<'a> {
 }
 
 /// Changes of the unknowns with each of the last `count` of them, all of which are free parameters.
-fn fixed(
-    problem: &mut dyn ZeroProblem,
-    u: &[f64],
-    count: usize,
-) -> Result<Vec<Vec<f64>>, crate::contract::Singular> {
+fn fixed(problem: &mut dyn ZeroProblem, u: &[f64], count: usize) -> Result<Vec<Vec<f64>>, crate::contract::Singular> {
     let size = u.len();
     let unit = |i: usize| {
         let mut row = vec![0.0; size];

@@ -57,7 +57,16 @@ impl Followed {
                 let off = |own: &crate::diagram::SpecialPoint| (own.point.parameters[0] - near).abs();
                 off(a.1).total_cmp(&off(b.1))
             })
-            .unwrap_or_else(|| panic!("no {kind} in {:?}", self.diagram.branches.iter().map(|b| b.special.iter().map(|s| (s.kind, s.point.parameters[0])).collect::<Vec<_>>()).collect::<Vec<_>>()));
+            .unwrap_or_else(|| {
+                panic!(
+                    "no {kind} in {:?}",
+                    self.diagram
+                        .branches
+                        .iter()
+                        .map(|b| b.special.iter().map(|s| (s.kind, s.point.parameters[0])).collect::<Vec<_>>())
+                        .collect::<Vec<_>>()
+                )
+            });
         let system = System::of_plan(&self.model, &self.plan).in_units_of(&self.diagram);
         (of_special(&system, found.0, found.1, &self.plan), found.1.point.parameters[0])
     }
@@ -197,10 +206,8 @@ fn points_of_maps_move_as_their_closed_form_says() {
     let by = found.of(Measured::Parameter, 2).unwrap();
     assert!((by.value - 1.0 / slope).abs() < 1e-8, "{by:?} {}", 1.0 / slope);
     // Delayed logistic map: the torus point is at r = 2, θ = π/3, whatever the scale k.
-    let delayed = ModelSource {
-        map: true,
-        ..model(&[("r", 1.8), ("k", 1.0)], &[("x", "r*x*(1 - y/k)"), ("y", "x")], &[])
-    };
+    let delayed =
+        ModelSource { map: true, ..model(&[("r", 1.8), ("k", 1.0)], &[("x", "r*x*(1 - y/k)"), ("y", "x")], &[]) };
     let own = followed(delayed, &[0.44, 0.44], [1.5, 2.2], &[]);
     let found = own.at(Kind::Torus, 2.0).0.unwrap();
     check(&found, Measured::Parameter, 1, 0.0);

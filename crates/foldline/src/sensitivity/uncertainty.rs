@@ -136,7 +136,9 @@ fn hypercube(base: &Base, spreads: &[(usize, Spread)], samples: usize) -> Vec<Ve
             column
         })
         .collect();
-    (0..samples).map(|k| spreads.iter().zip(&columns).map(|((index, _), column)| (*index, column[k])).collect()).collect()
+    (0..samples)
+        .map(|k| spreads.iter().zip(&columns).map(|((index, _), column)| (*index, column[k])).collect())
+        .collect()
 }
 
 /// All numbers at the special point for changed parameters.
@@ -193,7 +195,8 @@ fn walked(
         }
         if step == steps {
             values = posed.values(zero, &u, extras);
-            if posed.kind == Some(Kind::Hopf) && !values.iter().all(|(of, v)| *of != Measured::Period || v.is_finite()) {
+            if posed.kind == Some(Kind::Hopf) && !values.iter().all(|(of, v)| *of != Measured::Period || v.is_finite())
+            {
                 return Err("the eigenvalues are real at this sample: a neutral saddle".into());
             }
         }
@@ -248,7 +251,9 @@ mod tests {
 
     #[test]
     fn quantiles_of_the_normal_distribution_are_the_tabulated_ones() {
-        for (share, z) in [(0.5, 0.0), (0.975, 1.959963984540054), (0.99, 2.3263478740408408), (0.0005, -3.290526731491895)] {
+        for (share, z) in
+            [(0.5, 0.0), (0.975, 1.959963984540054), (0.99, 2.3263478740408408), (0.0005, -3.290526731491895)]
+        {
             assert!((normal_quantile(share) - z).abs() < 1e-12, "{share}: {}", normal_quantile(share));
         }
     }
