@@ -33,6 +33,8 @@ pub mod listed;
 mod routes;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_random;
 pub mod uncertainty;
 
 pub use crate::model::Spread;

@@ -6,7 +6,7 @@ use crate::diagram::{Diagram, Kind};
 use crate::explore::{BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, run};
 use crate::model::{Definition, Forcing, Model, ModelSource, Output, Parameter, State};
 
-fn model(parameters: &[(&str, f64)], equations: &[(&str, &str)], outputs: &[(&str, &str)]) -> ModelSource {
+pub(super) fn model(parameters: &[(&str, f64)], equations: &[(&str, &str)], outputs: &[(&str, &str)]) -> ModelSource {
     ModelSource {
         name: "test".into(),
         parameters: parameters.iter().map(|(name, value)| Parameter::new(name, *value)).collect(),
@@ -17,14 +17,14 @@ fn model(parameters: &[(&str, f64)], equations: &[(&str, &str)], outputs: &[(&st
     }
 }
 
-struct Followed {
-    model: Model,
-    plan: Plan,
-    diagram: Diagram,
+pub(super) struct Followed {
+    pub model: Model,
+    pub plan: Plan,
+    pub diagram: Diagram,
 }
 
 /// Follows a branch in the first parameter from the solution to which a state leads.
-fn followed(source: ModelSource, state: &[f64], range: [f64; 2], kinds: &[Kind]) -> Followed {
+pub(super) fn followed(source: ModelSource, state: &[f64], range: [f64; 2], kinds: &[Kind]) -> Followed {
     let model = Model::compile(source).unwrap_or_else(|why| panic!("{why:?}"));
     let parameters = model.defaults();
     let source = SeedSource::State(state.to_vec());

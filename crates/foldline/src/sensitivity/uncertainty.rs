@@ -142,7 +142,7 @@ fn hypercube(base: &Base, spreads: &[(usize, Spread)], samples: usize) -> Vec<Ve
 }
 
 /// All numbers at the special point for changed parameters.
-fn solved(posed: &Posed, base: &Base, route: &Route, sample: &[(usize, f64)]) -> Result<Vec<f64>, String> {
+pub(super) fn solved(posed: &Posed, base: &Base, route: &Route, sample: &[(usize, f64)]) -> Result<Vec<f64>, String> {
     /// Steps on the way to a sample that one step does not reach as predicted.
     const STEPS: usize = 8;
     match walked(posed, base, route, sample, 1) {
