@@ -146,7 +146,7 @@ class Sensitivity(Mapping[str, Derivative]):
         axes = axes_or_new(ax)
         change = {name: given.get(name, 0.01 * abs(self._parameters[name]) or 0.01) for name in self}
         order = sorted(self, key=lambda name: abs(self[name].value * change[name]))
-        for side, colour, word in ((-1, COLOURS[0], "less"), (1, COLOURS[1], "more")):
+        for side, colour, word in ((-1, COLOURS[0], "lower"), (1, COLOURS[1], "higher")):
             lengths = [side * self[name].value * change[name] for name in order]
             axes.barh(range(len(order)), lengths, color=colour, alpha=0.85, height=0.65, label=word)
         axes.set_yticks(range(len(order)), [f"{label(name, self._model)} ± {change[name]:.3g}" for name in order])

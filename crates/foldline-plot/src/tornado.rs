@@ -87,7 +87,7 @@ pub fn tornado(title: &str, axis: &str, bars: &[Bar], note: &str) -> String {
     let y = bottom + 40.0;
     draw(text(0.5 * (left + right), y, "middle", SIZE, axis));
     let x = MARGIN;
-    for (offset, colour, word) in [(0.0, BLUE, "less"), (52.0, VERMILION, "more")] {
+    for (offset, colour, word) in [(0.0, BLUE, "lower"), (60.0, VERMILION, "higher")] {
         draw(format!(
             "<rect x=\"{:.1}\" y=\"{:.1}\" width=\"10\" height=\"10\" fill=\"{colour}\" opacity=\"0.85\"/>",
             x + offset,

@@ -61,6 +61,8 @@ pub enum Style {
     Number,
     /// As `Number`, but left out if every row has the same value.
     Varying,
+    /// Right-aligned, four decimals.
+    Share,
     /// A small quantity of which only the magnitude matters: 1.2e-9.
     Size,
     /// Left out of text; for programs, not for readers.

@@ -94,7 +94,7 @@ fn sensitivity(entries: &[Entry]) -> Table {
         column("derivative", Style::Number),
         column("error", Style::Size),
         column("unit", Style::Word),
-        column("elasticity", Style::Number),
+        column("elasticity", Style::Share),
         column("remark", Style::Word),
     ];
     let row = |entry: &Entry| {
@@ -109,8 +109,7 @@ fn sensitivity(entries: &[Entry]) -> Table {
             number(found.map(|own| own.value)),
             number(found.map(|own| own.error)),
             word(&ratio(&entry.unit, &entry.per)),
-            // Six decimals are enough for a share.
-            number(entry.elasticity.map(|share| (share * 1e6).round() / 1e6)),
+            number(entry.elasticity),
             word(entry.found.as_ref().err().map_or("", |reason| reason)),
         ]
     };

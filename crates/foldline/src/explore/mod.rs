@@ -64,6 +64,7 @@ mod tests;
 mod tests_identity;
 
 pub use axis::axis_of;
+pub(crate) use corner::SLIDING;
 pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};

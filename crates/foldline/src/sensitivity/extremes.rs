@@ -131,6 +131,55 @@ pub fn slope(
     if found.is_finite() { Ok(found) } else { Err("the model gives no derivative of it") }
 }
 
+/// A solution with its change: the profile of the change, and that of the parameters.
+pub struct Moved {
+    /// The solution.
+    pub at: Point,
+    /// Change of the state, or of the profile on the same mesh.
+    pub along: Vec<f64>,
+    /// Change of all parameters.
+    pub change: Vec<f64>,
+}
+
+/// Returns the largest difference of the change of a channel between two computations on different meshes, next to the
+/// extremum of the first: within a mesh interval of the second to either side. The difference at the extremum alone depends
+/// on where it lies between the nodes of both meshes, and may vanish there. 0 without a mesh.
+pub fn difference(field: &dyn VectorField, extreme: &Extreme, own: &Moved, other: &Moved) -> f64 {
+    /// Times within the interval.
+    const TIMES: usize = 16;
+    let (Solution::Cycle(cycle), Solution::Cycle(second)) = (&own.at.solution, &other.at.solution) else { return 0.0 };
+    let times: Vec<f64> = match &extreme.place {
+        Place::Times(times) => times
+            .iter()
+            .flat_map(|t| {
+                let t = t.rem_euclid(1.0);
+                let j = second.mesh.partition_point(|node| *node <= t).clamp(1, second.mesh.len() - 1);
+                let h = second.mesh[j] - second.mesh[j - 1];
+                (0..TIMES).map(move |k| t + h * ((2 * k + 1) as f64 / TIMES as f64 - 1.0))
+            })
+            .collect(),
+        Place::Everywhere => (0..4 * TIMES).map(|k| (k as f64 + 0.37) / (4 * TIMES) as f64).collect(),
+        _ => return 0.0,
+    };
+    let part = |cycle: &Cycle, along: &[f64]| Cycle { profile: along.to_vec(), gain: Vec::new(), ..cycle.clone() };
+    let (first, second) = (part(cycle, &own.along), part(second, &other.along));
+    let change: Vec<f64> = own.change.iter().zip(&other.change).map(|(a, b)| a - b).collect();
+    let forced = f64::from(cycle.forcing_periods);
+    let apart = |t: f64| {
+        let moved: Vec<f64> = first.state(t).iter().zip(second.state(t)).map(|(a, b)| a - b).collect();
+        if let Some(own) = moved.get(extreme.channel) {
+            return own.abs();
+        }
+        let (x, time) = (cycle.state(t), (forced > 0.0).then_some(forced * t.rem_euclid(1.0)));
+        let parameters = Parameters::Shared(&own.at.parameters);
+        let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &[] };
+        let mut out = vec![0.0; field.output_count()];
+        field.outputs_along(batch, &[&moved[..], &change].concat(), &mut out);
+        out[extreme.channel - field.dim()].abs()
+    };
+    times.into_iter().map(apart).filter(|off| off.is_finite()).fold(0.0, f64::max)
+}
+
 /// All channels `[channels × lanes]` at states `[n × lanes]`.
 fn values(field: &dyn VectorField, parameters: &[f64], states: &[f64], times: &[f64]) -> Vec<f64> {
     let lanes = states.len() / field.dim().max(1);

@@ -21,7 +21,8 @@
 //!
 //! **Errors.** Every derivative is computed twice: on the mesh of the solution and on one with 1.5 times as many
 //! intervals. The second is returned. Its error is that of the first divided by 1.5^order, so that the difference bounds
-//! it where the order is at least two. Without a mesh the second computation begins elsewhere and has other rounding
+//! it where the order is at least two. For extremes, whose error depends on where they lie between the nodes, it is the
+//! largest difference of the changing profiles over the mesh intervals about the extremum. Without a mesh the second computation begins elsewhere and has other rounding
 //! errors.
 //!
 //! **Source.** govaerts2000, §4 (bordered extended systems); the elimination for many parameters is ours.
@@ -43,7 +44,7 @@ pub use uncertainty::{Band, Uncertainty, uncertainty};
 
 use crate::diagram::{Branch, Kind, Point, SpecialPoint};
 use crate::explore::plan::Plan;
-use crate::explore::{System, axis_of};
+use crate::explore::{SLIDING, System, axis_of};
 use crate::special::unfolded::{Unfolded, sizes};
 use routes::{Base, Posed};
 
@@ -150,6 +151,9 @@ fn unavailable(system: &System, branch: &Branch, special: &SpecialPoint) -> Opti
         _ if branch.held.is_some() => Some("a point of a curve in two parameters moves with both of them"),
         Kind::Mark => Some("a mark is at a value chosen in the study"),
         Kind::Unexplained => Some("it is not known which bifurcation this is"),
+        Kind::Grazing if special.remark.starts_with(SLIDING) => {
+            Some("grazing-sliding bifurcations have no defining system yet")
+        }
         Kind::Sliding => Some("sliding bifurcations have no defining system yet"),
         kind if kind.has_codimension_two() => Some("a point of codimension two moves with two parameters"),
         Kind::BranchPoint if special.kernel() > 1 => Some("the null space has more than one dimension"),

@@ -1,6 +1,6 @@
 //! The two computations of every derivative, on two meshes.
 
-use super::extremes::{self, Extreme};
+use super::extremes::{self, Extreme, Moved};
 use super::{Derivative, Measured, Row, Sensitivities};
 use crate::continuation::Settings;
 use crate::continuation::corrector::parameter_row;
@@ -56,6 +56,10 @@ pub(super) struct Route {
     pub directions: Vec<Vec<f64>>,
     /// `[parameters]` share of the unfolding in the direction.
     departures: Vec<f64>,
+    /// `[parameters]` the solution with its change, per unit of each parameter, and the extremes, which are the last
+    /// numbers.
+    moved: Vec<Moved>,
+    extremes: Vec<Extreme>,
 }
 
 /// A bifurcation, or solutions without one.
@@ -153,6 +157,11 @@ impl<'a> Posed<'a> {
                     let other = route.slopes[i].get(r).cloned().unwrap_or_else(|| Err("not confirmed".into()))?;
                     apart = apart.max((own - other).abs());
                 }
+                let extreme = (r + best.extremes.len()).checked_sub(best.values.len());
+                if let Some(extreme) = extreme.and_then(|k| best.extremes.get(k)) {
+                    let off = extremes::difference(self.system.field, extreme, &best.moved[i], &first.moved[i]);
+                    apart = apart.max(off);
+                }
                 let factor = if others.len() > 1 { SAFE } else { 1.0 };
                 Ok(Derivative { value: own, error: factor * apart + SHARED * f64::EPSILON * own.abs() })
             });
@@ -227,10 +236,13 @@ impl<'a> Posed<'a> {
             let unit = self.system.unit(*index);
             route.values = rows.iter().map(|(of, value, _)| (*of, *value)).collect();
             route.slopes.push(rows.into_iter().map(|(_, _, slope)| slope.map(|slope| slope / unit)).collect());
+            let along = at.tangent[extras..extras + size_of(&at)].iter().map(|x| x / unit).collect();
+            route.moved.push(Moved { along, change: change.iter().map(|x| x / unit).collect(), at });
             let length = problem.dot(&direction, &direction).sqrt();
             route.departures.push(problem.departure(&direction) / length);
             route.directions.push(direction);
         }
+        route.extremes = found.unwrap_or_default();
         Ok(route)
     }
 
@@ -249,10 +261,7 @@ impl<'a> Posed<'a> {
             rows.push((Measured::Parameter, at.parameters[self.free], Ok(change[self.free])));
         }
         let along = &at.tangent[extra[0].len()..];
-        let states = match &at.solution {
-            Solution::Equilibrium(x) => x.len(),
-            Solution::Cycle(cycle) => cycle.profile.len(),
-        };
+        let states = size_of(at);
         match (&at.solution, extra) {
             (Solution::Equilibrium(_), [[kappa], [moved]]) if self.kind == Some(Kind::Hopf) => {
                 let slope = match *kappa > 0.0 {
@@ -318,6 +327,14 @@ impl<'a> Posed<'a> {
             }
         });
         each.collect()
+    }
+}
+
+/// Number of values of the state, or of the profile.
+fn size_of(at: &Point) -> usize {
+    match &at.solution {
+        Solution::Equilibrium(x) => x.len(),
+        Solution::Cycle(cycle) => cycle.profile.len(),
     }
 }
 

@@ -36,9 +36,9 @@ fn stated_errors_contain_the_differences_on_random_models() {
                         let step = 1e-3 * (0.1 + base.parameters[*index].abs());
                         let at = |k: f64| solved(posed, base, &route, &[(*index, k * step)]);
                         let values = [-4.0, -2.0, -1.0, 1.0, 2.0, 4.0].map(at);
-                        let Ok([a, b, c, d, e, f]) = <[Vec<f64>; 6]>::try_from(
-                            values.into_iter().collect::<Result<Vec<_>, String>>()?,
-                        ) else {
+                        let Ok([a, b, c, d, e, f]) =
+                            <[Vec<f64>; 6]>::try_from(values.into_iter().collect::<Result<Vec<_>, String>>()?)
+                        else {
                             return Err("six values".into());
                         };
                         for (r, row) in found.rows.iter().enumerate() {
