@@ -136,7 +136,7 @@ pub struct Entry {
     /// The derivative, or the reason why there is none.
     pub found: Result<Derivative, String>,
     /// (p/q) dq/dp: percentage by which the number changes if the parameter changes by one per cent; `None` if one of them
-    /// is 0.
+    /// is 0, or the error exceeds 0.1 %.
     pub elasticity: Option<f64>,
 }
 
@@ -174,7 +174,11 @@ pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Mea
             }
             for (index, found) in sensitivities.parameters.iter().zip(&row.by) {
                 let p = point.parameters.get(*index).copied().unwrap_or(0.0);
-                let elasticity = found.as_ref().ok().map(|own| own.value * p / row.value);
+                // A number that is zero within rounding has none.
+                let known = found.as_ref().ok().filter(|own| {
+                    (own.error * p / row.value).abs() <= 1e-3 * (own.value * p / row.value).abs().max(1.0)
+                });
+                let elasticity = known.map(|own| own.value * p / row.value);
                 entries.push(Entry {
                     quantity: quantity.clone(),
                     unit: row.of.unit(model, point.free),

@@ -20,7 +20,8 @@ const SHARPER: f64 = 0.2;
 /// three samples of a rounding error exceed a quarter of its bound nearly always.
 const STARTS: usize = 3;
 const SAFE: f64 = 4.0;
-/// Rounding errors that both computations may share, in units of the machine precision times the size of a derivative.
+/// Rounding errors that both computations may share, in units of the machine precision times the size of the changes: that
+/// of some hundred operations.
 const SHARED: f64 = 256.0;
 /// Change of a parameter, relative to its scale, at which a branch point must still exist.
 const CHANGE: f64 = 1e-2;
@@ -54,7 +55,8 @@ pub(super) struct Route {
     pub slopes: Vec<Vec<Result<f64, String>>>,
     /// `[parameters][unknowns]` changes of the unknowns per scale of each parameter.
     pub directions: Vec<Vec<f64>>,
-    /// `[parameters]` share of the unfolding in the direction.
+    /// `[parameters]` length of the direction, and the share of the unfolding in it.
+    lengths: Vec<f64>,
     departures: Vec<f64>,
     /// `[parameters]` the solution with its change, per unit of each parameter, and the extremes, which are the last
     /// numbers.
@@ -163,11 +165,26 @@ impl<'a> Posed<'a> {
                     apart = apart.max(off);
                 }
                 let factor = if others.len() > 1 { SAFE } else { 1.0 };
-                Ok(Derivative { value: own, error: factor * apart + SHARED * f64::EPSILON * own.abs() })
+                let unit = self.system.unit(self.parameters[i]);
+                let size = self.size(of, value, own * unit) * best.lengths[i] / unit;
+                Ok(Derivative { value: own, error: factor * apart + SHARED * f64::EPSILON * size })
             });
             Row { of, value, by: by.collect() }
         });
         Ok(Sensitivities { rows: rows.collect(), parameters: self.parameters.clone() })
+    }
+
+    /// Characteristic size of a number, to which rounding errors are relative, given its value and its change with the
+    /// scale of a parameter.
+    fn size(&self, of: Measured, value: f64, change: f64) -> f64 {
+        let scale = |k: usize| self.system.scales.get(k).copied().unwrap_or(0.0);
+        let own = match of {
+            Measured::Parameter => self.system.unit(self.free),
+            Measured::Period => 0.0,
+            Measured::Angle => 1.0,
+            Measured::Smallest(k) | Measured::Largest(k) => scale(k),
+        };
+        own + value.abs().max(change.abs())
     }
 
     /// The same solution on a denser mesh, or without one from another start.
@@ -239,6 +256,7 @@ impl<'a> Posed<'a> {
             let along = at.tangent[extras..extras + size_of(&at)].iter().map(|x| x / unit).collect();
             route.moved.push(Moved { along, change: change.iter().map(|x| x / unit).collect(), at });
             let length = problem.dot(&direction, &direction).sqrt();
+            route.lengths.push(length);
             route.departures.push(problem.departure(&direction) / length);
             route.directions.push(direction);
         }
