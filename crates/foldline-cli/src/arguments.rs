@@ -388,6 +388,10 @@ pub struct Table {
     /// `all`; can be repeated [default: the parameter of the branch, the period, and the angle of the multipliers]
     #[arg(long, value_name = "NAME")]
     pub of: Vec<String>,
+    /// With --sensitivities and --branch: derivatives at the point with this position on the branch, special or not, all other
+    /// parameters fixed
+    #[arg(long, value_name = "N", allow_negative_numbers = true, requires = "branch")]
+    pub position: Option<i64>,
     /// With --uncertainty: number of samples at which the special points are solved again
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub samples: u32,

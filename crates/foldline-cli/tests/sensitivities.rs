@@ -267,6 +267,13 @@ fn the_tables_contain_what_was_computed() {
     let mark = rows.iter().find(|row| row["kind"] == "mark").unwrap();
     assert!(mark["remark"].as_str().unwrap().contains("chosen in the study"), "{mark:?}");
 
+    // At a = -2, x = -2 solves a + 3 x = x³: x_a = 1/(3 x² - 3), x_b = x/9, x_c = -x³/9.
+    let rows = json(&["--sensitivities", "--branch", "rest", "--position", "0"]);
+    let by = |name: &str| rows.iter().find(|row| row["parameter"] == name).unwrap()["derivative"].as_f64().unwrap();
+    for (name, exact) in [("a", 1.0 / 9.0), ("b", -2.0 / 9.0), ("c", 8.0 / 9.0)] {
+        assert!((by(name) - exact).abs() < 1e-10, "{name}: {}", by(name));
+    }
+
     let rows = json(&["--uncertainty", "--samples", "50"]);
     let fold = rows.iter().find(|row| row["kind"] == "fold" && row["at"].as_f64().unwrap() > 0.0).unwrap();
     // (1 · 0.03)² + (1 · 0.2/√12)²
@@ -296,6 +303,8 @@ fn mistakes_are_answered_with_their_cause() {
         (&["table", "run", "--sensitivities", "--of", "x_mix"][..], 2, "there is no number \"x_mix\""),
         (&["table", "run", "--sensitivities", "--unit", "a=m"][..], 2, "--unit does not apply"),
         (&["table", "run", "--of", "a"][..], 2, "--of applies to"),
+        (&["table", "run", "--sensitivities", "--branch", "rest", "--position", "999"][..], 2, "has no point 999"),
+        (&["table", "run", "--branch", "rest", "--position", "1"][..], 2, "--position applies to"),
         (&["plot", "run", "--uncertainty", "-o", "p.svg"][..], 2, "no parameter of the run is uncertain"),
         (&["plot", "run", "--tornado", "y", "-o", "p.svg"][..], 2, "there is no number \"y\""),
         (&["plot", "run", "--tornado", "a", "--at", "rest:7", "-o", "p.svg"][..], 2, "no such special point"),

@@ -85,6 +85,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special | What::Responses | What::Notes => Part::Special,
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
+    if typed.position.is_some() {
+        return Err(Failure::typed("--position applies to --sensitivities", "leave it out"));
+    }
     if !typed.of.is_empty() {
         return Err(Failure::typed("--of applies to --sensitivities and --uncertainty", "leave it out"));
     }

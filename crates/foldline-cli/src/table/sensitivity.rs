@@ -7,7 +7,7 @@ use crate::progress::SignOfLife;
 use foldline::diagram::Branch;
 use foldline::explore::System;
 use foldline::model::Model;
-use foldline::sensitivity::listed::{Entry, Listed, entries, sensitivities, uncertainties};
+use foldline::sensitivity::listed::{Entry, Listed, at_position, entries, sensitivities, uncertainties};
 use foldline::sensitivity::{Measured, Sensitivities, Uncertainty};
 use foldline_store::nearest::suggest;
 use foldline_store::run_file::Part;
@@ -31,9 +31,12 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     check_names(&run.model, &typed.of)?;
     let wanted = |of: Measured, name: &str| {
-        of.is_main() && (typed.of.is_empty() || typed.of.iter().any(|own| own == name))
+        (of.is_main() || typed.position.is_some()) && (typed.of.is_empty() || typed.of.iter().any(|own| own == name))
             || typed.of.iter().any(|own| own == name || own == "all")
     };
+    if let Some(position) = typed.position {
+        return at_one(typed, &run, position, &wanted);
+    }
     let (table, failed) = if typed.what() == What::Sensitivities {
         let found = found(&run, &kept);
         (sensitivity(&entries(&found, &run.model, &wanted)), failures(&found))
@@ -55,6 +58,30 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     out.flush()?;
     failed.iter().try_for_each(|line| writeln!(stderr().lock(), "incomplete: {line}"))?;
     Ok(if failed.is_empty() { Outcome::Done } else { Outcome::Short })
+}
+
+/// Prints the derivatives at one solution.
+fn at_one(
+    typed: &Typed,
+    run: &Run,
+    position: i64,
+    wanted: &dyn Fn(Measured, &str) -> bool,
+) -> Result<Outcome, Failure> {
+    let branch = run.diagram.branches.iter().find(|own| Some(&own.name) == typed.branch.as_ref());
+    let Some(branch) = branch.filter(|_| typed.what() == What::Sensitivities) else {
+        let cure = "write --sensitivities --branch NAME --position N";
+        return Err(Failure::typed("--position: a point is given by its branch and its position", cure));
+    };
+    let system = System::of_plan(&run.model, &run.plan);
+    let found = at_position(&system, &run.diagram, &run.plan, (branch, position), &run.model, wanted);
+    let found = found.map_err(|why| {
+        let cure = format!("`foldline table DIR --points --branch {}` lists the points", branch.name);
+        Failure::typed(format!("--position {position}: {why}"), cure)
+    })?;
+    let mut out = std::io::BufWriter::new(stdout().lock());
+    write(&sensitivity(&found), typed.format, &mut out)?;
+    out.flush()?;
+    Ok(Outcome::Done)
 }
 
 /// Checks the names given with `--of`.
@@ -101,7 +128,7 @@ fn sensitivity(entries: &[Entry]) -> Table {
         let found = entry.found.as_ref().ok();
         vec![
             Cell::Word(entry.branch.clone()),
-            Cell::Word(entry.kind.name().into()),
+            word(entry.kind.map_or("", |kind| kind.name())),
             Cell::Number(entry.at),
             word(&entry.quantity),
             number(Some(entry.value)),

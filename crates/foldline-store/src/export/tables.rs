@@ -198,7 +198,7 @@ fn sensitivities(entries: &[Entry], folder: &Path, begin: &Begin) -> Result<Path
         table.row(&[
             Cell::Text(entry.branch.clone()),
             Cell::Integer(entry.number as i64),
-            Cell::Text(entry.kind.name().into()),
+            text(entry.kind.map_or("", |kind| kind.name())),
             Cell::Text(entry.free.clone()),
             real(Some(entry.at)),
             text(&entry.quantity),

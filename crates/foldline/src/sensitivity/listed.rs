@@ -1,7 +1,7 @@
 //! Derivatives of all special points of a diagram, as a list with names.
 
 use super::uncertainty::{Uncertainty, uncertainty};
-use super::{Derivative, Measured, Sensitivities, of_special, unavailable};
+use super::{Derivative, Measured, Sensitivities, of_point, of_special, unavailable};
 use crate::diagram::{Branch, Diagram, Kind, SpecialPoint};
 use crate::explore::System;
 use crate::explore::plan::Plan;
@@ -117,8 +117,8 @@ pub struct Entry {
     pub branch: String,
     /// Index of the special point on the branch.
     pub number: usize,
-    /// Kind of the special point.
-    pub kind: Kind,
+    /// Kind of the special point; `None` for another solution.
+    pub kind: Option<Kind>,
     /// Name of the parameter of the branch.
     pub free: String,
     /// Value of that parameter.
@@ -140,18 +140,15 @@ pub struct Entry {
     pub elasticity: Option<f64>,
 }
 
-/// Returns the derivatives one by one, of the numbers whose names are wanted; an entry without names where a special point
-/// has none.
-pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Measured, &str) -> bool) -> Vec<Entry> {
-    let mut entries = Vec::new();
-    for point in all {
-        let name = |index: usize| model.parameters.get(index).map_or_else(String::new, |own| own.name.clone());
-        let empty = Entry {
-            branch: point.branch.clone(),
-            number: point.number,
-            kind: point.kind,
-            free: name(point.free),
-            at: point.at,
+impl Entry {
+    /// An entry of a solution without names of a number and a parameter.
+    fn at(branch: &str, number: usize, kind: Option<Kind>, model: &Model, free: usize, at: f64) -> Entry {
+        Entry {
+            branch: branch.into(),
+            number,
+            kind,
+            free: model.parameters.get(free).map_or_else(String::new, |own| own.name.clone()),
+            at,
             quantity: String::new(),
             unit: String::new(),
             value: f64::NAN,
@@ -159,38 +156,76 @@ pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Mea
             per: String::new(),
             found: Err(String::new()),
             elasticity: None,
-        };
-        let sensitivities = match &point.found {
-            Ok(sensitivities) => sensitivities,
-            Err(reason) => {
-                entries.push(Entry { found: Err(reason.clone()), ..empty });
-                continue;
-            }
-        };
-        for row in &sensitivities.rows {
-            let quantity = row.of.name(model, point.free);
+        }
+    }
+
+    /// The derivatives of a solution one by one, with the branch of this entry.
+    fn each(
+        &self,
+        found: &Sensitivities,
+        model: &Model,
+        (free, parameters): (usize, &[f64]),
+        wanted: &dyn Fn(Measured, &str) -> bool,
+    ) -> Vec<Entry> {
+        let mut entries = Vec::new();
+        for row in &found.rows {
+            let quantity = row.of.name(model, free);
             if !wanted(row.of, &quantity) {
                 continue;
             }
-            for (index, found) in sensitivities.parameters.iter().zip(&row.by) {
-                let p = point.parameters.get(*index).copied().unwrap_or(0.0);
+            for (index, derivative) in found.parameters.iter().zip(&row.by) {
+                let p = parameters.get(*index).copied().unwrap_or(0.0);
                 // A number that is zero within rounding has none.
-                let known = found.as_ref().ok().filter(|own| {
+                let known = derivative.as_ref().ok().filter(|own| {
                     (own.error * p / row.value).abs() <= 1e-3 * (own.value * p / row.value).abs().max(1.0)
                 });
                 let elasticity = known.map(|own| own.value * p / row.value);
                 entries.push(Entry {
                     quantity: quantity.clone(),
-                    unit: row.of.unit(model, point.free),
+                    unit: row.of.unit(model, free),
                     value: row.value,
-                    parameter: name(*index),
+                    parameter: model.parameters[*index].name.clone(),
                     per: model.parameters[*index].unit.clone(),
-                    found: found.clone(),
+                    found: derivative.clone(),
                     elasticity: elasticity.filter(|share| share.is_finite() && p != 0.0),
-                    ..empty.clone()
+                    ..self.clone()
                 });
             }
         }
+        entries
     }
-    entries
+}
+
+/// Returns the derivatives at special points one by one, of the numbers whose names are wanted; an entry without names where
+/// a special point has none.
+pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Measured, &str) -> bool) -> Vec<Entry> {
+    let of = |point: &Listed<Sensitivities>| {
+        let empty = Entry::at(&point.branch, point.number, Some(point.kind), model, point.free, point.at);
+        match &point.found {
+            Ok(found) => empty.each(found, model, (point.free, &point.parameters), wanted),
+            Err(reason) => vec![Entry { found: Err(reason.clone()), ..empty }],
+        }
+    };
+    all.iter().flat_map(of).collect()
+}
+
+/// Returns the derivatives at the solution with that position on a branch one by one, of the numbers whose names are wanted.
+///
+/// # Errors
+/// The reason why there are none.
+pub fn at_position(
+    system: &System,
+    diagram: &Diagram,
+    plan: &Plan,
+    (branch, position): (&Branch, i64),
+    model: &Model,
+    wanted: &dyn Fn(Measured, &str) -> bool,
+) -> Result<Vec<Entry>, String> {
+    let system = system.clone().in_units_of(diagram);
+    let point = branch.points.iter().find(|point| point.position == position);
+    let point = point.ok_or_else(|| format!("the branch {} has no point {position}", branch.name))?;
+    let found = of_point(&system, branch, point, plan)?;
+    let at = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+    let empty = Entry::at(&branch.name, 0, None, model, branch.free, at);
+    Ok(empty.each(&found, model, (branch.free, &point.parameters), wanted))
 }
