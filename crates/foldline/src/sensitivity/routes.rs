@@ -242,8 +242,15 @@ impl<'a> Posed<'a> {
             parameters: base.parameters.clone(),
             axes,
         };
-        let mut route =
-            Route { values: Vec::new(), slopes: Vec::new(), directions: Vec::new(), departures: Vec::new() };
+        let mut route = Route {
+            values: Vec::new(),
+            slopes: Vec::new(),
+            directions: Vec::new(),
+            lengths: Vec::new(),
+            departures: Vec::new(),
+            moved: Vec::new(),
+            extremes: Vec::new(),
+        };
         let mut found: Option<Vec<Extreme>> = None;
         for (index, direction) in self.parameters.iter().zip(directions) {
             let at = problem.point(&u, &direction, Examination::default());

@@ -183,7 +183,7 @@ fn walked(
         let before = u.clone();
         u.iter_mut().zip(&part).for_each(|(u, d)| *u += d);
         zero.anchor(&u);
-        sharpen(zero, &mut u)?;
+        sharpen(zero, &mut u).map_err(|why| format!("no such point was found ({why})"))?;
         let off: Vec<f64> = u.iter().zip(&before).zip(&part).map(|((u, b), d)| u - b - d).collect();
         let (off, expected) = (zero.relative_size(&off, &u), zero.relative_size(&part, &u));
         // Far from the base the prediction of a later step is its own.
