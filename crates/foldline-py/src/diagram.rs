@@ -3,7 +3,7 @@
 use crate::bytes::{counted, integers, numbers, parts};
 use crate::failure;
 use crate::saving::save;
-use crate::sensitivity::{Band, Row};
+use crate::sensitivity::{Distributions, Row};
 use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::VectorField;
@@ -141,7 +141,7 @@ impl Diagram {
         index: usize,
         spreads: HashMap<String, (f64, Option<f64>)>,
         samples: usize,
-    ) -> PyResult<(Vec<Band>, Vec<(String, usize)>)> {
+    ) -> PyResult<Distributions> {
         self.distributions(py, branch, index, spreads, samples)
     }
 

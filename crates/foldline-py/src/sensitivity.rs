@@ -16,6 +16,9 @@ pub type Row = (String, String, f64, Vec<(String, Option<(f64, f64)>, String)>);
 /// the samples.
 pub type Band = (String, f64, Option<[f64; 2]>, Option<[f64; 2]>, Option<[f64; 2]>);
 
+/// Bands of all numbers, and the reasons why samples failed, with their number.
+pub type Distributions = (Vec<Band>, Vec<(String, usize)>);
+
 impl Diagram {
     /// Derivatives at a special point, or at a point, of a branch.
     pub fn derivatives(&self, py: Python, branch: usize, special: bool, index: usize) -> PyResult<Vec<Row>> {
@@ -43,7 +46,7 @@ impl Diagram {
         index: usize,
         spreads: HashMap<String, (f64, Option<f64>)>,
         samples: usize,
-    ) -> PyResult<(Vec<Band>, Vec<(String, usize)>)> {
+    ) -> PyResult<Distributions> {
         self.of_the_model(py)?;
         let own = self.branch(py, branch)?;
         let (model, plan) = (&self.study.model, &self.study.plan);
