@@ -139,7 +139,7 @@ struct Inner {
     moving: Tapes<Moving>,
 }
 
-/// What a derivative along a direction is taken of, besides f.
+/// Functions besides f of which derivatives along a direction are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Moving {
     Outputs,

@@ -32,7 +32,7 @@ const SMOOTH: f64 = 1e-5;
 /// Slope at a mesh point, in variations per interval, above which it is a corner of the channel.
 const CORNER: f64 = 1e-3;
 
-/// Where a channel has its extremum.
+/// Place at which a channel has its extremum.
 #[derive(Clone, Debug, PartialEq)]
 enum Place {
     /// At the only state, or at an iterate of a map.

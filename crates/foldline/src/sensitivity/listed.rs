@@ -196,7 +196,7 @@ impl Entry {
     }
 }
 
-/// Returns the derivatives at special points one by one, of the numbers whose names are wanted; an entry without names where
+/// Returns the derivatives at special points one by one, of the numbers whose names are requested; an entry without names where
 /// a special point has none.
 pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Measured, &str) -> bool) -> Vec<Entry> {
     let of = |point: &Listed<Sensitivities>| {
@@ -209,7 +209,7 @@ pub fn entries(all: &[Listed<Sensitivities>], model: &Model, wanted: &dyn Fn(Mea
     all.iter().flat_map(of).collect()
 }
 
-/// Returns the derivatives at the solution with that position on a branch one by one, of the numbers whose names are wanted.
+/// Returns the derivatives at the solution with that position on a branch one by one, of the numbers whose names are requested.
 ///
 /// # Errors
 /// The reason why there are none.

@@ -187,7 +187,7 @@ impl<'a> Posed<'a> {
         own + value.abs().max(change.abs())
     }
 
-    /// The same solution on a denser mesh, or without one from another start.
+    /// Solves for the solution again on a denser mesh, or without one from another start.
     fn again(&self, base: &Base, start: usize) -> Result<Base, String> {
         let mut problem = self.isolated(&base.parameters)?;
         let problem = problem.zero();
