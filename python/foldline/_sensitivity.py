@@ -192,9 +192,12 @@ class Band(NamedTuple):
 
 def bands(rows: Any, failed: Any) -> dict[str, Band]:
     """Returns the bands of a special point by the name of the number."""
-    pair = lambda own: None if own is None else (own[0], own[1])  # noqa: E731
     reasons = dict(failed)
-    return {name: Band(value, pair(first), pair(sampled), pair(span), reasons) for name, value, first, sampled, span in rows}
+    return {name: Band(value, _pair(first), _pair(sampled), _pair(span), reasons) for name, value, first, sampled, span in rows}
+
+
+def _pair(own: Any) -> tuple[float, float] | None:
+    return None if own is None else (own[0], own[1])
 
 
 def spreads(model: Model, given: Mapping[str, Any]) -> dict[str, tuple[float, float | None]]:

@@ -54,7 +54,12 @@ def test_uncertainty_follows_from_standard_deviations_and_ranges(cubic):
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [({"q": 1.0}, "no such parameter"), ({"b": -1.0}, "positive standard deviation"), ({"b": (2, 1)}, "range"), ({"b": "x"}, "not an uncertainty")],
+    [
+        ({"q": 1.0}, "no such parameter"),
+        ({"b": -1.0}, "positive standard deviation"),
+        ({"b": (2, 1)}, "range"),
+        ({"b": "x"}, "not an uncertainty"),
+    ],
 )
 def test_mistakes_name_their_remedy(cubic, given, said):
     with pytest.raises(foldline.ArgumentError, match=said):
