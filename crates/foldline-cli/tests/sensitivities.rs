@@ -289,13 +289,15 @@ fn the_tables_contain_what_was_computed() {
         assert!((by(name) - exact).abs() < 1e-10, "{name}: {}", by(name));
     }
 
-    let rows = json(&["--uncertainty", "--samples", "50"]);
+    let rows = json(&["--uncertainty", "--samples", "400"]);
     let fold = rows.iter().find(|row| row["kind"] == "fold" && row["at"].as_f64().unwrap() > 0.0).unwrap();
     // (1 · 0.03)² + (1 · 0.2/√12)²
     let sigma = (0.03f64.powi(2) + 0.04 / 12.0).sqrt();
     assert!((fold["sigma"].as_f64().unwrap() - sigma).abs() < 1e-8, "{fold:?}");
-    assert!((fold["sampled_sigma"].as_f64().unwrap() - sigma).abs() < 0.05 * sigma, "{fold:?}");
-    assert_eq!((fold["samples"].as_i64(), fold["failed"].as_i64()), (Some(50), Some(0)));
+    // N samples of two parameters are correlated by 1/√N at random, which changes σ by s₁ s₂/(σ √N): three times that.
+    let allowed = 3.0 * 0.03 * (0.04f64 / 12.0).sqrt() / (sigma * 20.0);
+    assert!((fold["sampled_sigma"].as_f64().unwrap() - sigma).abs() < allowed, "{fold:?}");
+    assert_eq!((fold["samples"].as_i64(), fold["failed"].as_i64()), (Some(400), Some(0)));
 
     let output = foldline(folder.path(), &["export", "run", "--format", "csv", "--sensitivities"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
