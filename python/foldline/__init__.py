@@ -19,6 +19,7 @@ from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, 
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._rotor import rotor
+from ._sensitivity import Band, Derivative, Sensitivity
 from ._simulation import Trajectory
 from ._solution import Attractor, Attractors, Solution
 from ._strobe import Strobe, strobe
@@ -34,7 +35,9 @@ __all__ = [
     "ArgumentError",
     "Attractor",
     "Attractors",
+    "Band",
     "Branch",
+    "Derivative",
     "Diagram",
     "EndedShort",
     "Error",
@@ -45,6 +48,7 @@ __all__ = [
     "NoSolution",
     "Responses",
     "RunFileError",
+    "Sensitivity",
     "Solution",
     "SpecialPoint",
     "SpecialPoints",

@@ -12,6 +12,7 @@ import numpy as np
 from . import _native
 from ._arguments import suggestion
 from ._arrays import Complexes, Floats, Integers, complexes, floats, integers
+from ._sensitivity import Band, Sensitivity, bands, spreads
 from ._solution import Solution
 
 if TYPE_CHECKING:
@@ -66,6 +67,7 @@ class SpecialPoint(Solution):
         diagram = branch.diagram
         super().__init__(diagram._native.solution(branch._index, True, index), diagram.model)
         self.branch = branch
+        self._index = index
         self.number = number
         self.kind: str = row[0]
         self.unstable_before: int = row[1]
@@ -80,6 +82,63 @@ class SpecialPoint(Solution):
     def value(self) -> float:
         """Value of the parameter of the branch, in the unit of the model."""
         return self[self.branch.free]
+
+    @cached_property
+    def sensitivities(self) -> dict[str, Sensitivity]:
+        """Derivatives of every number at this point with respect to every other parameter, by the name of the number.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a + b*x - x^3"}, parameters={"a": -2.0, "b": 3.0})
+        >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
+        >>> round(branch.special["fold"][0].sensitivities["x_max"]["b"].value, 6)
+        -0.166667
+        """
+        return self.branch._sensitivities(True, self._index, self.parameters)
+
+    @property
+    def sensitivity(self) -> Sensitivity:
+        """Derivatives of the parameter of the branch at this point with respect to every other parameter.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a + b*x - x^3"}, parameters={"a": -2.0, "b": 3.0})
+        >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
+        >>> round(branch.special["fold"][0].sensitivity["b"].value, 6)
+        1.0
+        """
+        return self.sensitivities[self.branch.free]
+
+    def uncertainty(self, samples: int = 100, **parameters: float | tuple[float, float]) -> dict[str, Band]:
+        """Returns the distribution of every number at this point if parameters are uncertain.
+
+        Parameters
+        ----------
+        samples : int
+            Number of samples of the parameters at which the point is solved again.
+        **parameters : float or tuple of float
+            Standard deviation of a normal distribution about the value, or ends of a uniform distribution. Others are as in the
+            study and the model.
+
+        Returns
+        -------
+        dict
+            `Band` by the name of the number.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a + b*x - x^3"}, parameters={"a": -2.0, "b": 3.0})
+        >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
+        >>> band = branch.special["fold"][0].uncertainty(b=(2.9, 3.1))["a"]
+        >>> [round(end, 2) for end in band.range]
+        [1.91, 2.1]
+        """
+        diagram = self.branch.diagram
+        given = spreads(diagram.model, parameters)
+        return bands(*diagram._native.uncertainty(self.branch._index, self._index, given, samples))
 
     def __repr__(self) -> str:
         form = f", {self.normal_form}" if self.normal_form else ""
@@ -306,6 +365,36 @@ class Branch(Sequence[Solution]):
 
     def __len__(self) -> int:
         return self._count
+
+    def _sensitivities(self, special: bool, index: int, parameters: Mapping[str, float]) -> dict[str, Sensitivity]:
+        rows = self.diagram._native.sensitivities(self._index, special, index)
+        return {row[0]: Sensitivity(self.diagram.model, parameters, row) for row in rows}
+
+    def sensitivities(self, index: int) -> dict[str, Sensitivity]:
+        """Returns the derivatives of the period and the extremes of a solution with respect to every parameter.
+
+        Parameters
+        ----------
+        index : int
+            Number of the solution on the branch, as in ``branch[index]``.
+
+        Returns
+        -------
+        dict
+            `Sensitivity` by the name of the number: ``"period"``, or a state or output followed by ``_min`` or ``_max``. The
+            continuation parameter is one of the parameters; each changes while the others stay.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a - c*x^2"}, parameters={"a": 1.0, "c": 2.0})
+        >>> rest = foldline.follow(model.settle([0.5]), "a", (0.5, 2))
+        >>> start = list(rest["position"]).index(0)
+        >>> [round(rest.sensitivities(start)["x_max"][name].value, 6) for name in ("a", "c")]
+        [0.353553, -0.176777]
+        """
+        own = self[index]
+        return self._sensitivities(False, range(self._count)[index], own.parameters)
 
     @cached_property
     def special(self) -> SpecialPoints:

@@ -378,6 +378,23 @@ pub struct Table {
     /// Results of surveys and sweeps
     #[arg(long, group = "what")]
     pub responses: bool,
+    /// Derivatives of the special points with respect to every parameter
+    #[arg(long, group = "what")]
+    pub sensitivities: bool,
+    /// Uncertainty of the special points from that of the parameters
+    #[arg(long, group = "what")]
+    pub uncertainty: bool,
+    /// With --sensitivities or --uncertainty: also this number (`period`, or a state or output followed by _min or _max), or
+    /// `all`; can be repeated [default: the parameter of the branch, the period, and the angle of the multipliers]
+    #[arg(long, value_name = "NAME")]
+    pub of: Vec<String>,
+    /// With --sensitivities and --branch: derivatives at the point with this position on the branch, special or not, all other
+    /// parameters fixed
+    #[arg(long, value_name = "N", allow_negative_numbers = true, requires = "branch")]
+    pub position: Option<i64>,
+    /// With --uncertainty: number of samples at which the special points are solved again
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    pub samples: u32,
     /// Only this branch, or the legs of this homotopy
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,
@@ -398,6 +415,8 @@ pub enum What {
     Branches,
     Responses,
     Notes,
+    Sensitivities,
+    Uncertainty,
 }
 
 impl Table {
@@ -407,6 +426,8 @@ impl Table {
             (self.branches, What::Branches),
             (self.responses, What::Responses),
             (self.notes, What::Notes),
+            (self.sensitivities, What::Sensitivities),
+            (self.uncertainty, What::Uncertainty),
         ];
         asked.into_iter().find(|(asked, _)| *asked).map_or(What::Special, |(_, what)| what)
     }
@@ -470,8 +491,20 @@ pub struct Plot {
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
     /// Draw the two-parameter curves in their plane instead of the branches
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["uncertainty", "tornado"])]
     pub curves: bool,
+    /// Draw the uncertainty of the special points as error bars: two standard deviations to either side, to first order. A
+    /// study with `uncertainty = true` asks for it too
+    #[arg(long, conflicts_with = "tornado")]
+    pub uncertainty: bool,
+    /// Draw instead how much each parameter changes this number at a special point: the parameter of the branch, `period`, or
+    /// a state or output followed by _min or _max
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "window"])]
+    pub tornado: Option<String>,
+    /// With --tornado: the special point, as BRANCH:NUMBER counted from 1 or KIND, such as fold [default: the first that has
+    /// sensitivities]
+    #[arg(long, value_name = "POINT", requires = "tornado")]
+    pub at: Option<String>,
     /// Limits of the axes
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
     pub window: Option<String>,
@@ -504,6 +537,9 @@ pub struct Export {
     /// Leave out the profiles of cycles, which are nearly all of the data
     #[arg(long)]
     pub no_profiles: bool,
+    /// Also write a table of the derivatives of the special points with respect to every parameter
+    #[arg(long)]
+    pub sensitivities: bool,
     /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
     /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]

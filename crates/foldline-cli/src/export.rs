@@ -2,9 +2,11 @@
 
 use crate::arguments::{Export as Typed, ExportFormat};
 use crate::failure::{Failure, Outcome};
-use crate::table::{asked_for, conversion};
+use crate::table::{asked_for, conversion, found};
 use crate::verbosity::report;
+use foldline::sensitivity::listed::entries;
 use foldline_store::export::{Export, ExportError, Format};
+use foldline_store::run_file::Part;
 use foldline_view::Amount;
 
 /// Writes a run in another format and reports the path.
@@ -25,6 +27,22 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(conversion) = conversion(export.model(), &typed.unit)? {
         export.show_in(conversion);
     }
+    if typed.sensitivities {
+        if format == Format::NetCdf {
+            let message = "--sensitivities: a NetCDF file has no table of sensitivities";
+            return Err(Failure::typed(message, "export them with --format csv or parquet"));
+        }
+        if !typed.unit.is_empty() {
+            return Err(Failure::typed(
+                "--sensitivities: derivatives are in the units of the model",
+                "leave out --unit",
+            ));
+        }
+        let branches: Vec<String> = export.diagram.branches.iter().map(|branch| branch.name.clone()).collect();
+        let run = crate::table::read(&typed.folder, Part::Everything)?;
+        let found = found(&run, &|branch| branches.contains(&branch.name));
+        export.sensitivities = Some(entries(&found, &run.model, &|_, _| true));
+    }
     let out = typed.out.clone().unwrap_or_else(|| typed.folder.join(name));
     if format == Format::NetCdf && out.is_dir() {
         let cure = format!("name a file, such as --out {}", out.join("run.nc").display());
@@ -42,8 +60,8 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
 
 /// Writes a run as a page that needs no server.
 fn page(typed: &Typed) -> Result<Outcome, Failure> {
-    if !typed.branch.is_empty() || !typed.unit.is_empty() || typed.no_profiles {
-        let message = "--format html: --branch, --unit and --no-profiles do not apply to a page";
+    if !typed.branch.is_empty() || !typed.unit.is_empty() || typed.no_profiles || typed.sensitivities {
+        let message = "--format html: --branch, --unit, --no-profiles and --sensitivities do not apply to a page";
         return Err(Failure::typed(message, "leave them out; the page shows and hides branches itself"));
     }
     let out = typed.out.clone().unwrap_or_else(|| typed.folder.join("run.html"));

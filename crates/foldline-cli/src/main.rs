@@ -15,6 +15,7 @@ mod rotor;
 mod run;
 mod simulate;
 mod table;
+mod tornado;
 mod values;
 mod verbosity;
 mod verify;

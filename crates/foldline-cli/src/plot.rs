@@ -2,14 +2,19 @@
 
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::table::{Run, conversion, read};
+use crate::tornado;
 use crate::verbosity::report;
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Diagram};
+use foldline::explore::System;
 use foldline::model::Model;
+use foldline::sensitivity::Measured;
+use foldline::sensitivity::listed::uncertainties;
 use foldline_plot::quantity::{default_x, default_y, label};
 use foldline_plot::responses::value;
-use foldline_plot::{Picture, Quantity, pdf, png, svg};
+use foldline_plot::{Picture, Quantity, deviation_layers, pdf, png, svg};
 use foldline_store::run_file::Part;
 use std::path::Path;
 
@@ -23,10 +28,20 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         let found = name.as_ref().and_then(|name| foldline_plot::axis(name, &run.model).ok());
         found.is_some_and(|quantity| quantity.needs_profile())
     };
-    if run.model.iterated() || run.model.conditions() != [0, 0] || profiled(&typed.x) || profiled(&typed.y) {
-        // Iterates, values at the ends of an interval and harmonics need the profiles.
+    let open = run.model.conditions() != [0, 0];
+    let sensitive = typed.uncertainty || run.uncertainty || typed.tornado.is_some();
+    if run.model.iterated() || open || profiled(&typed.x) || profiled(&typed.y) || sensitive {
+        // Iterates, values at the ends of an interval and harmonics need the profiles; sensitivities need those of special
+        // points.
         run = read(&typed.folder, Part::Everything)?;
     }
+    if let Some(name) = &typed.tornado {
+        return tornado::write(typed, &run, name);
+    }
+    let deviations = match (typed.uncertainty || run.uncertainty) && !typed.curves {
+        true => deviations(typed, &run)?,
+        false => Vec::new(),
+    };
     let Run { mut model, mut diagram, .. } = run;
     if let Some(conversion) = conversion(&model, &typed.unit)? {
         (diagram, model) = (conversion.diagram(diagram), conversion.model().clone());
@@ -47,10 +62,47 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         title: typed.title.clone(),
         ..Picture::default()
     };
-    draw(&diagram, &model, &picture, &typed.output)?;
     let axes = [picture.x.unwrap_or_else(|| default_x(&diagram)), picture.y.unwrap_or_else(|| default_y(&model))];
+    let layers = deviation_layers(&diagram, axes[0], axes[1], &deviations);
+    if layers.is_empty() && !deviations.is_empty() {
+        report(format_args!("note: no error bars, because neither axis is the parameter of a branch"))?;
+    }
+    let picture = Picture { layers, ..picture };
+    draw(&diagram, &model, &picture, &typed.output)?;
     undrawn(&diagram, &model, axes)?;
     Ok(Outcome::Done)
+}
+
+/// Standard deviations of the special points to first order, by branch and index.
+fn deviations(typed: &Typed, run: &Run) -> Result<Vec<(String, usize, f64)>, Failure> {
+    if run.spreads.is_empty() {
+        let cure = "state one in the study or the model, such as `zeta = { value = 0.01, sigma = 0.002 }` in \
+                    `[parameters]`, and run the study again";
+        return Err(Failure::typed("--uncertainty: no parameter of the run is uncertain", cure));
+    }
+    if !typed.unit.is_empty() {
+        let message = "--unit: uncertainty is drawn in the units of the model";
+        return Err(Failure::typed(message, "leave out --unit, or --uncertainty"));
+    }
+    let working = SignOfLife::of("computing uncertainties");
+    let system = System::of_plan(&run.model, &run.plan);
+    let all = uncertainties(&system, &run.diagram, &run.plan, &run.spreads, 0, &|branch| branch.held.is_none());
+    drop(working);
+    let mut out = Vec::new();
+    for point in all {
+        let band = point.found.and_then(|found| {
+            let own = found.bands.into_iter().find(|band| band.of == Measured::Parameter);
+            own.map_or_else(|| Err("no band".to_string()), |band| band.first_order)
+        });
+        match band {
+            Ok([_, sigma]) => out.push((point.branch, point.number, sigma)),
+            Err(_) if point.expected => {}
+            Err(why) => {
+                report(format_args!("note: no error bar for the {} of {}: {why}", point.kind.title(), point.branch))?
+            }
+        }
+    }
+    Ok(out)
 }
 
 /// Reports the surveys and sweeps that have no value for the quantity on an axis.

@@ -45,6 +45,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "from-auto",
         "how-to",
         "maps",
+        "sensitivities",
         "tutorial-forced-oscillator",
         "tutorial-neuron",
         "tutorial-rotor",

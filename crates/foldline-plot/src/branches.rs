@@ -2,7 +2,7 @@
 
 use crate::curve::{marks, stretches};
 use crate::figure::{Layer, Marker, Shape};
-use crate::palette::nth;
+use crate::palette::{BLACK, nth};
 use foldline::diagram::{Branch, Diagram, Kind, Origin};
 use foldline::special::quantity::Quantity;
 
@@ -65,6 +65,30 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
     // The entry for branches that branch off goes last.
     curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
     curves.into_iter().chain(specials).collect()
+}
+
+/// Error bars of special points, given by branch and index with the standard deviation of the parameter of the branch: two
+/// standard deviations to either side. Empty if no axis shows that parameter.
+pub fn deviation_layers(
+    diagram: &Diagram,
+    x: Quantity,
+    y: Quantity,
+    deviations: &[(String, usize, f64)],
+) -> Vec<Layer> {
+    let mut bars = Vec::new();
+    for (name, number, sigma) in deviations {
+        let branch = diagram.branches.iter().find(|branch| branch.name == *name);
+        let Some((branch, special)) = branch.and_then(|own| Some((own, own.special.get(*number)?))) else { continue };
+        let (Some(a), Some(b)) = (x.of(&special.point), y.of(&special.point)) else { continue };
+        let reach = 2.0 * sigma;
+        let ends = match Quantity::Parameter(branch.free) {
+            own if own == x => [[a - reach, b], [a + reach, b]],
+            own if own == y => [[a, b - reach], [a, b + reach]],
+            _ => continue,
+        };
+        bars.push(Layer::curve(&ends, BLACK).wide(5.0).faint(0.35).named("± 2 standard deviations"));
+    }
+    bars
 }
 
 /// Labels beside the curves where there is room, one for each branch that was not switched to, so that curves can be

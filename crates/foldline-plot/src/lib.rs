@@ -24,8 +24,9 @@ pub mod responses;
 mod scale;
 mod texts;
 pub mod ticks;
+pub mod tornado;
 
-pub use branches::{branch_curve, branch_layers, diagram_layers, special_layers};
+pub use branches::{branch_curve, branch_layers, deviation_layers, diagram_layers, special_layers};
 pub use compose::figure_svg;
 pub use figure::{Axis, Figure, Layer, LegendPlace, Marker, Panel};
 pub use foldline::special::quantity::Quantity;
@@ -34,3 +35,4 @@ pub use quantity::{axis, label};
 #[cfg(feature = "render")]
 pub use render::{RenderError, pdf, png};
 pub use responses::response_layers;
+pub use tornado::{Bar, tornado};

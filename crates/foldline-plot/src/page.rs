@@ -2,7 +2,7 @@
 
 use crate::branches::{diagram_layers, label_layers, root_count};
 use crate::compose::figure_svg;
-use crate::figure::{Axis, Figure, LegendPlace, Panel};
+use crate::figure::{Axis, Figure, Layer, LegendPlace, Panel};
 use crate::quantity::{default_x, default_y, label};
 use crate::responses::response_layers;
 use foldline::diagram::Diagram;
@@ -22,11 +22,13 @@ pub struct Picture {
     pub title: Option<String>,
     /// Width and height in units of the SVG.
     pub size: [f64; 2],
+    /// Further layers, drawn below the branches.
+    pub layers: Vec<Layer>,
 }
 
 impl Default for Picture {
     fn default() -> Picture {
-        Picture { x: None, y: None, window: None, title: None, size: [960.0, 600.0] }
+        Picture { x: None, y: None, window: None, title: None, size: [960.0, 600.0], layers: Vec::new() }
     }
 }
 
@@ -56,7 +58,7 @@ pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
     let [wide, high] = picture.window.map_or([None, None], |[x0, x1, y0, y1]| [Some([x0, x1]), Some([y0, y1])]);
     let [width, height] = picture.size;
     let title = if picture.title.is_some() { 31.0 } else { 0.0 };
-    let mut layers = diagram_layers(diagram, x, y);
+    let mut layers: Vec<Layer> = picture.layers.iter().cloned().chain(diagram_layers(diagram, x, y)).collect();
     let responses = response_layers(diagram, x, y, root_count(diagram));
     match y {
         // Behind the branches: there are many.

@@ -3,6 +3,7 @@
 use crate::bytes::{counted, integers, numbers, parts};
 use crate::failure;
 use crate::saving::save;
+use crate::sensitivity::{Distributions, Row};
 use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::VectorField;
@@ -15,6 +16,7 @@ use foldline_store::short;
 use foldline_store::study_file::{self, parse_study_of_run};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,7 +28,7 @@ pub struct Diagram {
     /// Subject of each remark, and the remark.
     #[pyo3(get)]
     pub notes: Vec<(String, String)>,
-    /// True if some quantities are in other units than those of the model.
+    /// True if quantities are in other units than those of the equations.
     pub converted: bool,
 }
 
@@ -109,7 +111,7 @@ impl Diagram {
         let Some(quantity) = Quantity::named(name, model) else { return Ok(None) };
         if self.converted && quantity.needs_profile() {
             let message = format!("`{name}` is computed in the units of the model");
-            return Err(failure::of_argument(py, message, "take it from the diagram without other units".into()));
+            return Err(failure::of_argument(py, message, "take it from the diagram without other units"));
         }
         let branch = self.branch(py, branch)?;
         let value = |point: &Point| quantity.on(point, model).unwrap_or(f64::NAN);
@@ -147,12 +149,25 @@ impl Diagram {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
         let diagram = diagram::Diagram { branches: vec![branch], ..diagram::Diagram::default() };
-        Ok(Diagram {
-            diagram: Arc::new(diagram),
-            study: Arc::clone(&self.study),
-            notes: Vec::new(),
-            converted: self.converted,
-        })
+        let (diagram, study) = (Arc::new(diagram), Arc::clone(&self.study));
+        Ok(Diagram { diagram, study, notes: Vec::new(), converted: self.converted })
+    }
+
+    /// Derivatives at a special point, or at a point, of a branch.
+    fn sensitivities(&self, py: Python, branch: usize, special: bool, index: usize) -> PyResult<Vec<Row>> {
+        self.derivatives(py, branch, special, index)
+    }
+
+    /// Distributions of the numbers at a special point for uncertain parameters: standard deviations, or ranges.
+    fn uncertainty(
+        &self,
+        py: Python,
+        branch: usize,
+        index: usize,
+        spreads: HashMap<String, (f64, Option<f64>)>,
+        samples: usize,
+    ) -> PyResult<Distributions> {
+        self.distributions(py, branch, index, spreads, samples)
     }
 
     /// Solution at the target of a homotopy.

@@ -21,6 +21,7 @@ mod patience;
 mod pictures;
 mod saving;
 mod seeds;
+mod sensitivity;
 mod simulation;
 mod solution;
 mod study;

@@ -146,6 +146,15 @@ impl<'t> Walk<'t> {
         }
     }
 
+    /// Reads `true` or `false`.
+    pub(crate) fn boolean(&mut self, value: &Value, what: &str) -> Option<bool> {
+        let found = value.get_ref().as_bool();
+        if found.is_none() {
+            self.wrong_type(value, value.get_ref().type_str(), what, "`true` or `false`");
+        }
+        found
+    }
+
     /// Reads a non-empty string.
     pub(crate) fn string(&mut self, value: &Value, what: &str) -> Option<String> {
         match value.get_ref().as_str() {

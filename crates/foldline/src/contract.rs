@@ -107,6 +107,18 @@ pub trait VectorField: Send + Sync {
         self.output_count() == 0
     }
 
+    /// Derivative of the outputs along a direction `[(n + k) × lanes]` in states and parameters, as for
+    /// [`VectorField::directional`]: writes `[output_count × lanes]`. NaN for a field that does not provide it.
+    fn outputs_along(&self, _at: Batch, _direction: &[f64], out: &mut [f64]) {
+        out.fill(f64::NAN);
+    }
+
+    /// Derivative of [`VectorField::time_unit`] along a change `[k]` of the parameters; NaN for a field that does not
+    /// provide it.
+    fn time_unit_along(&self, _parameters: &[f64], _change: &[f64]) -> f64 {
+        if self.forced() && !self.iterated() { f64::NAN } else { 0.0 }
+    }
+
     /// Number of switching functions: scalars at whose zeros f or one of its derivatives jumps. 0 if the field is
     /// smooth.
     fn switch_count(&self) -> usize {

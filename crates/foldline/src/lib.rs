@@ -22,6 +22,7 @@
 //! | where do first solutions come from? | [`attractors`] |
 //! | how is a whole diagram assembled? | [`explore`] |
 //! | is it right? | [`verify`] |
+//! | how does it depend on every parameter? | [`sensitivity`] |
 //! | what is it in other units? | [`converted`] |
 
 pub mod attractors;
@@ -33,6 +34,7 @@ pub mod explore;
 pub mod linalg;
 pub mod model;
 pub mod problem;
+pub mod sensitivity;
 pub mod simulation;
 pub mod special;
 pub mod stability;

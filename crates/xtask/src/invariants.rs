@@ -30,6 +30,7 @@ const MODULES: &[(&str, &[&str])] = &[
     ("model", &["contract", "linalg", "units"]),
     // `problem::cycle::meshes` uses the test of collapse to an equilibrium.
     ("problem", &["contract", "diagram", "linalg", "special", "stability"]),
+    ("sensitivity", &["attractors", "continuation", "contract", "diagram", "explore", "model", "problem", "special"]),
     ("simulation", &["contract", "diagram", "linalg"]),
     ("special", &["contract", "diagram", "linalg", "model", "problem", "stability"]),
     ("stability", &["linalg"]),

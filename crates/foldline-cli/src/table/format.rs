@@ -60,6 +60,7 @@ fn shown(cell: &Cell, style: Style, decimals: Option<usize>) -> String {
         (Cell::Count(count), ..) => count.to_string(),
         (Cell::Number(value), _, None) | (Cell::Number(value), Style::Size, _) if *value == 0.0 => "0".to_string(),
         (Cell::Number(value), Style::Size, _) => format!("{value:.1e}"),
+        (Cell::Number(value), Style::Share, _) => without_sign_of_zero(format!("{value:.4}")),
         (Cell::Number(value), _, Some(decimals)) => without_sign_of_zero(format!("{value:.decimals$}")),
         (Cell::Number(value), _, None) => format!("{value:.9e}"),
         (Cell::Spectrum(values), ..) => {

@@ -3,6 +3,9 @@
 mod columns;
 mod format;
 mod responses;
+mod sensitivity;
+
+pub use sensitivity::found;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
@@ -10,7 +13,7 @@ use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
-use foldline::model::Model;
+use foldline::model::{Model, Spread};
 use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
@@ -60,6 +63,8 @@ pub enum Style {
     Number,
     /// As `Number`, but left out if every row has the same value.
     Varying,
+    /// Right-aligned, four decimals.
+    Share,
     /// A small quantity of which only the magnitude matters: 1.2e-9.
     Size,
     /// Left out of text; for programs, not for readers.
@@ -80,7 +85,14 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let part = match typed.what() {
         What::Points | What::Branches => Part::Numbers,
         What::Special | What::Responses | What::Notes => Part::Special,
+        What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
+    if typed.position.is_some() {
+        return Err(Failure::typed("--position applies to --sensitivities", "leave it out"));
+    }
+    if !typed.of.is_empty() {
+        return Err(Failure::typed("--of applies to --sensitivities and --uncertainty", "leave it out"));
+    }
     let mut run = read(&typed.folder, part)?;
     let record = std::mem::take(&mut run.plan.record);
     let recorded: Vec<Quantity> = record.iter().map(|(_, quantity)| *quantity).collect();
@@ -107,6 +119,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
+        What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
     write(&table, typed.format, &mut out)?;
@@ -171,6 +184,10 @@ pub struct Run {
     pub diagram: Diagram,
     /// Subject of each remark, and the remark.
     pub notes: Vec<(String, String)>,
+    /// Uncertain parameters, by index.
+    pub spreads: Vec<(usize, Spread)>,
+    /// True if the study asks for uncertainty in plots.
+    pub uncertainty: bool,
 }
 
 /// Reads as much of the run in a folder as `part` asks for.
@@ -184,7 +201,8 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
     // Remarks on one subject stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
-    Ok(Run { model: study.model, plan: study.plan, diagram, notes })
+    let (spreads, uncertainty) = (study.spreads, study.uncertainty);
+    Ok(Run { model: study.model, plan: study.plan, diagram, notes, spreads, uncertainty })
 }
 
 /// Selects the branches meant by a name given on the command line; all of them without a name.

@@ -23,6 +23,7 @@ use crate::study_file::{Study, parse_study_of_run};
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::model::Model;
+use foldline::sensitivity::listed::Entry;
 use foldline::special::quantity::{Quantity, append};
 use std::fmt;
 use std::fs::File;
@@ -83,6 +84,8 @@ pub struct Export {
     pub diagram: Diagram,
     /// True if the profiles of cycles are exported too.
     pub profiles: bool,
+    /// Derivatives of the special points, for a table of their own.
+    pub sensitivities: Option<Vec<Entry>>,
 }
 
 impl Export {
@@ -97,7 +100,7 @@ impl Export {
         let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
         let study = study.map_err(ExportError::Study)?;
         let diagram = ordered(run.diagram, &names(&study.plan));
-        Ok(Export { reading, study, conversion: None, diagram, profiles: true })
+        Ok(Export { reading, study, conversion: None, diagram, profiles: true, sensitivities: None })
     }
 
     /// Returns the model in the units of the export.

@@ -1,10 +1,12 @@
-//! Tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`.
+//! Tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`,
+//! `sensitivities`.
 
 use super::cells::{Cell, branch_cells, point_cells, profile, response_cells, special_cells};
 use super::columns::{Class, Column, Variables, of_branch};
 use super::{Export, ExportError};
 use foldline::diagram::Point;
 use foldline::model::Model;
+use foldline::sensitivity::listed::Entry;
 use std::path::{Path, PathBuf};
 
 /// Table that is written row by row.
@@ -23,6 +25,9 @@ pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec
     done.extend(points(export, folder, begin, &variables)?);
     if !export.diagram.responses.is_empty() {
         done.push(responses(export, folder, begin, &variables)?);
+    }
+    if let Some(entries) = &export.sensitivities {
+        done.push(sensitivities(entries, folder, begin)?);
     }
     Ok(done)
 }
@@ -158,6 +163,54 @@ fn responses(export: &Export, folder: &Path, begin: &Begin, variables: &Variable
             row.extend(response_cells(response, model));
             table.row(&row)?;
         }
+    }
+    table.finish()
+}
+
+fn sensitivities(entries: &[Entry], folder: &Path, begin: &Begin) -> Result<PathBuf, ExportError> {
+    let column = |name: &str, class: Class, description: &str| Column {
+        name: name.into(),
+        class,
+        unit: String::new(),
+        description: description.into(),
+    };
+    let columns = [
+        column("branch", Class::Text, "name of the branch"),
+        column("special", Class::Integer, "index of the special point on the branch, from 0"),
+        column("kind", Class::Text, "kind of the special point"),
+        column("free", Class::Text, "parameter of the branch"),
+        column("at", Class::Real, "its value"),
+        column("quantity", Class::Text, "number that changes"),
+        column("value", Class::Real, "its value"),
+        column("parameter", Class::Text, "parameter with respect to which the derivative is taken"),
+        column("derivative", Class::Real, "derivative of the quantity, in the units of the model"),
+        column("error", Class::Real, "bound on its error"),
+        column("elasticity", Class::Real, "relative change of the quantity over that of the parameter"),
+        column("unit", Class::Text, "unit of the quantity"),
+        column("per", Class::Text, "unit of the parameter"),
+        column("remark", Class::Text, "reason why there is no derivative"),
+    ];
+    let mut table = begin(folder, "sensitivities", &columns)?;
+    let real = |value: Option<f64>| value.filter(|v| v.is_finite()).map_or(Cell::Empty, Cell::Real);
+    let text = |text: &str| if text.is_empty() { Cell::Empty } else { Cell::Text(text.into()) };
+    for entry in entries {
+        let found = entry.found.as_ref().ok();
+        table.row(&[
+            Cell::Text(entry.branch.clone()),
+            Cell::Integer(entry.number as i64),
+            text(entry.kind.map_or("", |kind| kind.name())),
+            Cell::Text(entry.free.clone()),
+            real(Some(entry.at)),
+            text(&entry.quantity),
+            real(Some(entry.value)),
+            text(&entry.parameter),
+            real(found.map(|own| own.value)),
+            real(found.map(|own| own.error)),
+            real(entry.elasticity),
+            text(&entry.unit),
+            text(&entry.per),
+            text(entry.found.as_ref().err().map_or("", |reason| reason)),
+        ])?;
     }
     table.finish()
 }

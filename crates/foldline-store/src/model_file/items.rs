@@ -1,8 +1,8 @@
 //! Constants, parameters, definitions and outputs.
 
 use super::Reader;
-use crate::toml_walk::Value;
-use foldline::model::{Constant, Definition, Field, Item, ModelSource, Output, Parameter, constant_value};
+use crate::toml_walk::{Value, Walk};
+use foldline::model::{Constant, Definition, Field, Item, ModelSource, Output, Parameter, Spread, constant_value};
 use foldline::units::quantity;
 use std::ops::Range;
 use toml::de::DeValue;
@@ -51,12 +51,15 @@ impl Reader<'_> {
         let before = self.walk.found.len();
         let number = match value.get_ref() {
             DeValue::Table(table) => {
-                const KEYS: [&str; 10] = [
+                const KEYS: [&str; 13] = [
                     "value",
                     "values",
                     "unit",
                     "description",
                     "scale",
+                    "sigma",
+                    "low",
+                    "high",
                     "count",
                     "index",
                     "before",
@@ -96,6 +99,15 @@ impl Reader<'_> {
         if let Some(value) = value.get_ref().as_table().and_then(|table| table.get("scale")) {
             self.places.insert((item, Field::Scale), value.span());
             parameter.scale = self.measure(item, value, &format!("the scale of `{name}`"), &mut parameter.unit);
+        }
+        if let DeValue::Table(table) = value.get_ref() {
+            let name = parameter.name.clone();
+            let unit = &mut parameter.unit;
+            let numbers = ["sigma", "low", "high"].map(|key| {
+                let value = table.get(key)?;
+                Some((value.span(), self.measure(item, value, &format!("`{key}` of `{name}`"), unit)?))
+            });
+            parameter.spread = spread(&mut self.walk, &name, numbers);
         }
         source.parameters.push(parameter);
     }
@@ -191,5 +203,27 @@ impl Reader<'_> {
     fn no_expression(&mut self, place: Range<usize>, name: &str, what: &str) {
         let hint = format!("write `{name} = \"…\"` or give the table a key `expression`");
         self.walk.report(place, format!("{what} has no expression"), hint);
+    }
+}
+
+/// A number with its place in the text.
+type Placed = Option<(Range<usize>, f64)>;
+
+/// Distribution of an uncertain parameter, given `sigma`, `low` and `high`.
+pub(crate) fn spread(walk: &mut Walk, name: &str, numbers: [Placed; 3]) -> Option<Spread> {
+    const HINT: &str = "write `sigma = 0.1` for a standard deviation, or `low = 0.9, high = 1.1` for a range";
+    let mut wrong = |place: &Range<usize>, message: String| {
+        walk.report(place.clone(), message, HINT);
+        None
+    };
+    match numbers {
+        [None, None, None] => None,
+        [Some((_, sigma)), None, None] if sigma > 0.0 => Some(Spread::Normal(sigma)),
+        [Some((place, _)), None, None] => wrong(&place, format!("`sigma` of `{name}` is not positive")),
+        [None, Some((_, low)), Some((_, high))] if low < high => Some(Spread::Uniform([low, high])),
+        [None, Some((place, _)), Some(_)] => wrong(&place, format!("`low` of `{name}` is not below `high`")),
+        [Some((place, _)), ..] => wrong(&place, format!("`{name}` has a standard deviation and a range")),
+        [None, Some((place, _)), None] => wrong(&place, format!("`{name}` has `low` but no `high`")),
+        [None, None, Some((place, _))] => wrong(&place, format!("`{name}` has `high` but no `low`")),
     }
 }

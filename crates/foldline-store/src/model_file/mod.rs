@@ -5,7 +5,7 @@
 
 mod boundary;
 mod functions;
-mod items;
+pub(crate) mod items;
 mod mass;
 mod repeat;
 mod rotor;

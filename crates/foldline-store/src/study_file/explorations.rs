@@ -46,7 +46,7 @@ pub(super) fn read(
         refuse_name_of_part(walk, table, name.as_deref(), &names);
         let mut parameters = defaults.to_vec();
         if let Some(value) = table.get("parameters") {
-            override_parameters(walk, value, model, &mut parameters);
+            override_parameters(walk, value, model, &mut parameters, false);
         }
         let item = Item { what: "exploration", span: span.clone(), table };
         let free = free(walk, &item, model);

@@ -18,17 +18,18 @@ mod seeds;
 
 use crate::diagnostic::Diagnostic;
 use crate::finite::{check_explorations, check_seeds};
+use crate::model_file::items::spread;
 use crate::model_file::{parse_model, parse_model_of_run, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
 use foldline::contract::VectorField;
 use foldline::explore::Plan;
-use foldline::model::{Model, conserved, in_words};
+use foldline::model::{Model, Spread, conserved, in_words};
 use foldline::special::quantity::Quantity;
 use items::Items;
 use std::path::{Path, PathBuf};
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 /// Study: the computations requested, and the texts it was read from.
 #[derive(Clone, Debug)]
@@ -47,6 +48,10 @@ pub struct Study {
     pub plan: Plan,
     /// Profiles kept in the run file.
     pub store: Store,
+    /// Uncertain parameters, by index: those of the model unless the study states others.
+    pub spreads: Vec<(usize, Spread)>,
+    /// True if plots show the uncertainty of special points.
+    pub uncertainty: bool,
 }
 
 /// Points of cycles whose profiles are kept in the run file when the run is complete. Special points and the ends of
@@ -62,7 +67,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 18] = [
+const ROOT_KEYS: [&str; 19] = [
     "model",
     "title",
     "description",
@@ -74,6 +79,7 @@ const ROOT_KEYS: [&str; 18] = [
     "store",
     "record",
     "parameters",
+    "uncertainty",
     "seed",
     "branch",
     "curve",
@@ -209,7 +215,7 @@ fn parse(
     let [limits, simulation] = limits(&mut walk, &root, &model.time);
     let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     if let Some(value) = root.get("parameters") {
-        override_parameters(&mut walk, value, &model, &mut defaults);
+        override_parameters(&mut walk, value, &model, &mut defaults, true);
     }
     no_motions(&mut walk, &root, &model);
     let record: Vec<(String, Quantity)> = root
@@ -219,6 +225,8 @@ fn parse(
         .flatten()
         .map(|(quantity, span)| (text[span].trim_matches(['"', '\'']).to_string(), quantity))
         .collect();
+    let spreads = spreads(&mut walk, &root, &model);
+    let uncertainty = root.get("uncertainty").is_some_and(|value| uncertainty(&mut walk, value, &spreads));
     let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
@@ -254,7 +262,17 @@ fn parse(
         sweeps,
         record,
     };
-    Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
+    Ok(Study {
+        file: file.to_string(),
+        text: text.to_string(),
+        model_file,
+        model_text,
+        model,
+        plan,
+        store,
+        spreads,
+        uncertainty,
+    })
 }
 
 /// Reports what does not exist for a boundary-value problem: whatever needs motions from initial states, or curves in
@@ -369,16 +387,57 @@ fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
     tolerance
 }
 
-/// Replaces the parameter values given in a table `{ name = number, … }`.
-fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &mut [f64]) {
+/// Reads the distributions of uncertain parameters: those of the model, replaced by those of the study.
+fn spreads(walk: &mut Walk, root: &DeTable, model: &Model) -> Vec<(usize, Spread)> {
+    let mut all: Vec<Option<Spread>> = model.parameters.iter().map(|own| own.spread).collect();
+    let table = root.get("parameters").and_then(|value| value.get_ref().as_table());
+    for (key, value) in table.into_iter().flat_map(|table| table.iter()) {
+        let name: &str = key.get_ref();
+        let (Some(index), DeValue::Table(inner)) = (model.parameter_index(name), value.get_ref()) else { continue };
+        let unit = &model.parameters[index].unit;
+        let numbers = ["sigma", "low", "high"].map(|key| {
+            let value = inner.get(key)?;
+            Some((value.span(), walk.quantity(value, &format!("`{key}` of `{name}`"), unit)?))
+        });
+        all[index] = spread(walk, name, numbers).or(all[index]);
+    }
+    all.into_iter().enumerate().filter_map(|(index, spread)| Some((index, spread?))).collect()
+}
+
+/// Reads `uncertainty`: true to show it in plots.
+fn uncertainty(walk: &mut Walk, value: &Value, spreads: &[(usize, Spread)]) -> bool {
+    let wanted = walk.boolean(value, "`uncertainty`").unwrap_or(false);
+    if wanted && spreads.is_empty() && walk.found.is_empty() {
+        walk.report(
+            value.span(),
+            "no parameter is uncertain",
+            "state an uncertainty, such as `zeta = { value = 0.01, sigma = 0.002 }` in `[parameters]`",
+        );
+    }
+    wanted
+}
+
+/// Replaces the parameter values given in a table `{ name = number, … }`; if `uncertain`, they may be tables with an
+/// uncertainty.
+fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &mut [f64], uncertain: bool) {
     let Some(table) = walk.table(value, "`parameters`") else { return };
     for (key, value) in table.iter() {
         let name: &str = key.get_ref();
+        let what = format!("the parameter `{name}`");
+        let value = match value.get_ref() {
+            // With an uncertainty, and perhaps a value.
+            DeValue::Table(inner) if uncertain => {
+                walk.only(inner, &["value", "sigma", "low", "high"], &what);
+                match inner.get("value") {
+                    Some(value) => value,
+                    None => continue,
+                }
+            }
+            _ => value,
+        };
         match model.parameter_index(name) {
             Some(index) => {
-                if let Some(number) =
-                    walk.quantity(value, &format!("the parameter `{name}`"), &model.parameters[index].unit)
-                {
+                if let Some(number) = walk.quantity(value, &what, &model.parameters[index].unit) {
                     values[index] = number;
                 }
             }

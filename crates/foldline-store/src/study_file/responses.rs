@@ -32,7 +32,7 @@ pub(super) fn surveys(
         let name = unique_name(walk, table, &span, "survey", &taken.iter().copied().chain(own).collect::<Vec<_>>());
         let mut parameters = defaults.to_vec();
         if let Some(value) = table.get("parameters") {
-            override_parameters(walk, value, model, &mut parameters);
+            override_parameters(walk, value, model, &mut parameters, false);
         }
         let free = free(walk, &Item { what: "survey", span: span.clone(), table }, model);
         let values = values(walk, table, &span, ("survey", unit_of(free, model)), true);

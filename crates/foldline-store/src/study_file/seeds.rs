@@ -34,7 +34,7 @@ pub(super) fn read(
         let Some(name) = unique_name(walk, table, &span, "seed", &taken) else { continue };
         let mut parameters = defaults.to_vec();
         if let Some(value) = table.get("parameters") {
-            override_parameters(walk, value, model, &mut parameters);
+            override_parameters(walk, value, model, &mut parameters, false);
         }
         let meant = source(walk, table, &span, model, degree, &parameters);
         if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {

@@ -49,6 +49,7 @@ use census::Pace;
 use census::STEP_LIMIT;
 use runner::PATIENT;
 pub use sampling::Sampling;
+pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
 

@@ -157,4 +157,4 @@ fn without_nodes_near(mesh: &Mesh, touch: &Touch) -> Mesh {
 }
 
 /// First word of the remark of a corner.
-pub(super) const SLIDING: &str = "grazing-sliding";
+pub(crate) const SLIDING: &str = "grazing-sliding";

@@ -81,8 +81,9 @@ impl Line {
             }
         };
         let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
+        let free = setting.freedom();
         let condition = OnLevels::new(setting, &holds.levels, &sizes, &like);
-        Box::new(Held::new(surface, Box::new(condition)))
+        Box::new(Held::new(surface, Box::new(condition), free))
     }
 
     /// Returns the problem of this curve through `point`, on the mesh of the point.
@@ -91,42 +92,57 @@ impl Line {
         if let Some(holds) = system.holds.filter(|_| self.held.is_none()) {
             return self.holding(system, holds, setting, degree, point);
         }
-        if system.field.iterated() {
-            let condition = self
-                .held
-                .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
-            let surface = Box::new(MapProblem::like(setting, &point.solution));
-            return match condition {
-                Some(condition) => Box::new(Held::new(surface, condition)),
-                None => surface,
-            };
+        let axes = setting.axes;
+        match self.held.and_then(|(kind, _)| held(system, kind, axes.clone(), degree, point)) {
+            Some(held) => Box::new(held),
+            None => surface(system, axes, degree, point, self.held.map(|(kind, _)| kind), self.doubled),
         }
-        if let (Some((Kind::BranchPoint, _)), Solution::Cycle(cycle), Some(unfolded)) =
-            (self.held, &point.solution, system.unfolded)
-        {
-            let cycle = mesh::at_least_some(cycle, degree);
-            let own = UnfoldedCycles::setting(&setting, unfolded, &system.scales, &cycle);
-            let condition = OnCycleBranchPoints::new(own.clone(), &cycle);
-            let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len());
-            return Box::new(Held::new(Box::new(surface), Box::new(condition)));
+    }
+}
+
+fn setting_of<'a>(system: &'a System, axes: Vec<Axis>, point: &Point) -> Setting<'a> {
+    Setting { field: system.field, scales: &system.scales, parameters: point.parameters.clone(), axes }
+}
+
+/// Returns the bifurcations of a kind in the parameters of `axes` as a problem through `point`, on its mesh; `None` if it
+/// cannot be posed for such solutions.
+pub fn held<'a>(system: &'a System, kind: Kind, axes: Vec<Axis>, degree: usize, point: &Point) -> Option<Held<'a>> {
+    let setting = setting_of(system, axes.clone(), point);
+    let free = axes.len();
+    if let (Kind::BranchPoint, Solution::Cycle(cycle), Some(unfolded), false) =
+        (kind, &point.solution, system.unfolded, system.field.iterated())
+    {
+        let cycle = mesh::at_least_some(cycle, degree);
+        let own = UnfoldedCycles::setting(&setting, unfolded, &system.scales, &cycle);
+        let condition = OnCycleBranchPoints::new(own.clone(), &cycle);
+        let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len(), free);
+        return Some(Held::new(Box::new(surface), Box::new(condition), free + 1));
+    }
+    let condition = special::condition::condition(kind, setting, degree, &point.solution)?;
+    let unfolded = kind == Kind::BranchPoint && !system.field.iterated();
+    let surface = surface(system, axes, degree, point, Some(kind), false);
+    Some(Held::new(surface, condition, free + usize::from(unfolded)))
+}
+
+/// Returns the problem of solutions in the parameters of `axes` like `point`, on its mesh: without a condition, but for
+/// branch points of equilibria with the amplitude of their unfolding. `doubled` as in [`Line`].
+pub fn surface<'a>(
+    system: &'a System,
+    axes: Vec<Axis>,
+    degree: usize,
+    point: &Point,
+    kind: Option<Kind>,
+    doubled: bool,
+) -> Box<dyn ZeroProblem + 'a> {
+    let setting = setting_of(system, axes, point);
+    match &point.solution {
+        solution if system.field.iterated() => Box::new(MapProblem::like(setting, solution)),
+        Solution::Equilibrium(_) if kind == Some(Kind::BranchPoint) => Box::new(EquilibriumProblem::unfolded(setting)),
+        Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
+        Solution::Cycle(cycle) if doubled && cycle.intervals() > 0 => {
+            Box::new(CycleProblem::like(setting, cycle).with_equal_halves())
         }
-        let condition = self
-            .held
-            .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
-        let surface: Box<dyn ZeroProblem + 'a> = match &point.solution {
-            Solution::Equilibrium(_) if self.held.is_some_and(|(kind, _)| kind == Kind::BranchPoint) => {
-                Box::new(EquilibriumProblem::unfolded(setting))
-            }
-            Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
-            Solution::Cycle(cycle) if self.doubled && cycle.intervals() > 0 => {
-                Box::new(CycleProblem::like(setting, cycle).with_equal_halves())
-            }
-            Solution::Cycle(cycle) => Box::new(CycleProblem::like(setting, &mesh::at_least_some(cycle, degree))),
-        };
-        match condition {
-            Some(condition) => Box::new(Held::new(surface, condition)),
-            None => surface,
-        }
+        Solution::Cycle(cycle) => Box::new(CycleProblem::like(setting, &mesh::at_least_some(cycle, degree))),
     }
 }
 

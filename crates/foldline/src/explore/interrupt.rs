@@ -142,6 +142,14 @@ impl VectorField for Interruptible<'_> {
         self.field.outputs(at, out);
     }
 
+    fn outputs_along(&self, at: Batch, direction: &[f64], out: &mut [f64]) {
+        self.field.outputs_along(at, direction, out);
+    }
+
+    fn time_unit_along(&self, parameters: &[f64], change: &[f64]) -> f64 {
+        self.field.time_unit_along(parameters, change)
+    }
+
     fn switch_count(&self) -> usize {
         self.field.switch_count()
     }

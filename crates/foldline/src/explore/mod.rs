@@ -27,6 +27,7 @@ mod accounts;
 mod arcs;
 mod arrival;
 mod averaged;
+mod axis;
 mod choice;
 mod corner;
 mod counted;
@@ -64,6 +65,8 @@ mod tests;
 #[cfg(test)]
 mod tests_identity;
 
+pub use axis::axis_of;
+pub(crate) use corner::SLIDING;
 pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};

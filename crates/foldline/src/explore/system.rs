@@ -129,6 +129,11 @@ impl<'a> System<'a> {
         }
     }
 
+    /// Returns the system with an unfolding of its field, for branch points of cycles.
+    pub fn with_unfolding(&self, unfolded: &'a Unfolded<'a>) -> System<'a> {
+        System { unfolded: Some(unfolded), ..self.clone() }
+    }
+
     /// Characteristic size of a parameter.
     pub fn unit(&self, index: usize) -> f64 {
         self.parameter_scales.get(index).copied().unwrap_or(1.0)

@@ -53,7 +53,8 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Boundary, Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State, Total,
+    Boundary, Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, Spread,
+    State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
@@ -141,6 +142,15 @@ struct Inner {
     condition_tapes: boundary::ConditionTapes,
     output_derivatives: Tapes<Vec<usize>>,
     period_derivatives: Tapes<()>,
+    /// Derivatives of the outputs and of the forcing period along a direction.
+    moving: Tapes<Moving>,
+}
+
+/// Functions besides f of which derivatives along a direction are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Moving {
+    Outputs,
+    Period,
 }
 
 /// Branch of f.
@@ -217,6 +227,7 @@ impl Model {
             condition_tapes: Default::default(),
             output_derivatives: RwLock::default(),
             period_derivatives: RwLock::default(),
+            moving: RwLock::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         let wrong = model.wrong_period().or_else(|| iterated::switched(&model)).or_else(|| boundary::switched(&model));
@@ -362,6 +373,24 @@ impl Model {
             let each = (0..self.parameters.len()).map(|k| Leaf::Parameter(k as u32));
             let slopes: Vec<graph::Id> = each.flat_map(|leaf| column(&mut graph, &[period], leaf)).collect();
             Tape::new(&graph, &[&slopes])
+        })
+    }
+
+    /// Derivative of the outputs or of the forcing period along a direction in states and parameters.
+    fn moving_tape(&self, what: Moving) -> Arc<Tape> {
+        cached(&self.inner.moving, what, || {
+            let Compiled { graph, outputs, period, .. } = &self.inner.compiled;
+            let roots: Vec<graph::Id> = match what {
+                Moving::Outputs => outputs.clone(),
+                Moving::Period => period.iter().copied().collect(),
+            };
+            let (mut graph, states) = (graph.clone(), self.states.len() as u32);
+            let derivative = graph.derivative(&roots, |graph, leaf| match leaf {
+                Leaf::State(j) => Some(graph.leaf(Leaf::Direction(0, j))),
+                Leaf::Parameter(k) => Some(graph.leaf(Leaf::Direction(0, states + k))),
+                _ => None,
+            });
+            Tape::new(&graph, &[&derivative])
         })
     }
 
@@ -528,6 +557,24 @@ impl VectorField for Model {
     fn linearise_outputs(&self, at: Batch, free: &[usize], mut to: [&mut [f64]; 4]) -> bool {
         self.output_tape(free).run(at, &[], &mut to);
         true
+    }
+
+    fn outputs_along(&self, at: Batch, direction: &[f64], out: &mut [f64]) {
+        self.moving_tape(Moving::Outputs).run(at, &[direction], &mut [out]);
+    }
+
+    fn time_unit_along(&self, parameters: &[f64], change: &[f64]) -> f64 {
+        if self.inner.period.is_none() {
+            return 0.0;
+        }
+        // The period does not depend on the states.
+        let direction = [&vec![0.0; self.dim()][..], change].concat();
+        let states = vec![0.0; self.dim()];
+        let at =
+            Batch { lanes: 1, states: &states, parameters: Parameters::Shared(parameters), times: &[0.0], signs: &[] };
+        let mut slope = [0.0];
+        self.moving_tape(Moving::Period).run(at, &[&direction], &mut [&mut slope]);
+        slope[0]
     }
 
     fn switch_count(&self) -> usize {

@@ -19,6 +19,17 @@ pub struct Parameter {
     pub repeat: Option<Repeat>,
     /// Value of each element of a repeated parameter; if empty, all elements have `value`.
     pub values: Vec<f64>,
+    /// Uncertainty of the value.
+    pub spread: Option<Spread>,
+}
+
+/// Distribution of an uncertain parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Spread {
+    /// Normal about the value of the parameter, with this standard deviation.
+    Normal(f64),
+    /// Uniform between two values.
+    Uniform([f64; 2]),
 }
 
 /// State component.
@@ -235,6 +246,7 @@ impl Parameter {
             scale: None,
             repeat: None,
             values: Vec::new(),
+            spread: None,
         }
     }
 }

@@ -34,6 +34,8 @@ const MEETING: f64 = 10.0;
 pub struct Held<'a> {
     surface: Box<dyn ZeroProblem + 'a>,
     condition: Box<dyn Condition + 'a>,
+    /// Dimension of the surface.
+    freedom: usize,
     /// Rows that fix the position on the surface, and the tangents τ found with them, each `[freedom][surface
     /// unknowns]`.
     rows: Vec<f64>,
@@ -53,14 +55,15 @@ pub struct Held<'a> {
 }
 
 impl<'a> Held<'a> {
-    /// Curve of the bifurcations that `condition` defines on `surface`, which has two free parameters. Both must be on
-    /// the same mesh.
-    pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>) -> Held<'a> {
-        let freedom = condition.equations() + 1 - condition.extra();
+    /// Bifurcations that `condition` defines on a surface with `freedom` free unknowns: parameters, and the amplitude of an
+    /// unfolding. Both must be on the same mesh. With two parameters they form a curve; with more, see
+    /// [`Held::directions`].
+    pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>, freedom: usize) -> Held<'a> {
         let (scale, rows) = (vec![1.0; condition.extra()], generic(freedom * surface.unknowns()));
         Held {
             surface,
             condition,
+            freedom,
             rows,
             tangents: Vec::new(),
             scale,
@@ -142,7 +145,62 @@ impl<'a> Held<'a> {
 
     /// Dimension of the surface.
     fn freedom(&self) -> usize {
-        self.condition.equations() + 1 - self.extra()
+        self.freedom
+    }
+
+    /// Directions in which the bifurcation moves at the solution `u` if one of the last `count` parameters λ_i changes by
+    /// 1 and the others of these stay: `[count][unknowns]`. With the tangents of (2) for all parameters,
+    ///
+    /// ```text
+    ///   (4)  [ g_w τ₁ … g_w τ_k   g_σ ] [ a ]   [ 0   ]
+    ///        [ λ_i(τ₁) … λ_i(τ_k)  0  ] [ σ ] = [ e_i ],      direction i = (σ, Σ a_j τ_j)
+    /// ```
+    ///
+    /// # Errors
+    /// [`Singular`] where the bifurcation does not persist, or the surface is singular.
+    pub fn directions(&mut self, u: &[f64], count: usize) -> Result<Vec<Vec<f64>>, Singular> {
+        let (e, size, k) = (self.extra(), self.surface.unknowns(), self.freedom());
+        let (width, equations) = (e + k, self.condition.equations());
+        if equations + count != width {
+            return Err(Singular);
+        }
+        let mut g = vec![0.0; equations];
+        if !self.condition_at(u, &mut g) {
+            return Err(Singular);
+        }
+        self.surface.factorise(&u[e..], &self.rows)?;
+        self.span(u);
+        let mut small = vec![0.0; width * width];
+        for (i, tangent) in self.tangents.chunks_exact(size).enumerate() {
+            self.condition.derivative(tangent, &vec![0.0; e], &mut g);
+            (0..equations).for_each(|line| small[line * width + i] = g[line]);
+            (0..count).for_each(|c| small[(equations + c) * width + i] = tangent[size - count + c]);
+        }
+        for i in 0..e {
+            let mut turn = vec![0.0; e];
+            turn[i] = 1.0;
+            self.condition.derivative(&vec![0.0; size], &turn, &mut g);
+            (0..equations).for_each(|line| small[line * width + k + i] = g[line]);
+        }
+        let mut pivots = vec![0; width];
+        lu::factorise(&mut small, width, &mut pivots)?;
+        let direction = |c: usize| {
+            let mut a = vec![0.0; width];
+            a[equations + c] = 1.0;
+            lu::solve(&small, width, &pivots, &mut a, 1);
+            let mut out = [&a[k..], &vec![0.0; size][..]].concat();
+            for (share, tangent) in a[..k].iter().zip(self.tangents.chunks_exact(size)) {
+                axpy(*share, tangent, &mut out[e..]);
+            }
+            out
+        };
+        let found: Vec<Vec<f64>> = (0..count).map(direction).collect();
+        if found.iter().flatten().all(|x| x.is_finite()) { Ok(found) } else { Err(Singular) }
+    }
+
+    /// Number of extra unknowns of the condition, which come first.
+    pub fn extras(&self) -> usize {
+        self.extra()
     }
 
     /// Examination of the surface with the critical eigenvalues at their exact values; `u` includes the extra unknowns.

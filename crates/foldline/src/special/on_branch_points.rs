@@ -33,8 +33,8 @@ use num_complex::Complex64;
 pub struct OnBranchPoints<'a> {
     setting: Setting<'a>,
     n: usize,
-    /// Direction of λ in the two parameters.
-    across: [f64; 2],
+    /// Direction of λ in the free parameters.
+    across: Vec<f64>,
     /// d `[n]` and C `[2][n + 1]`.
     left: Vec<f64>,
     right: Vec<f64>,
@@ -51,9 +51,9 @@ impl<'a> OnBranchPoints<'a> {
         let (n, scales) = (setting.field.dim(), setting.scales);
         let scale = |i: usize| scales.get(i).copied().unwrap_or(1.0);
         OnBranchPoints {
-            setting,
             n,
-            across: [1.0, 0.0],
+            across: (0..setting.freedom()).map(|k| if k == 0 { 1.0 } else { 0.0 }).collect(),
+            setting,
             left: (0..n).map(|k| scale(k) * (0.4 + (k as f64 * 1.3).sin())).collect(),
             right: (0..2 * (n + 1)).map(|k| (0.5 + (k as f64 * 1.7).cos()) / scale(k % (n + 1))).collect(),
             adjoint: Vec::new(),
@@ -75,7 +75,7 @@ impl<'a> OnBranchPoints<'a> {
 
     /// Converts a vector `[n + 1]` to a direction in states and parameters.
     fn spread(&self, v: &[f64]) -> Vec<f64> {
-        let change = self.across.map(|a| v[self.n] * a);
+        let change: Vec<f64> = self.across.iter().map(|a| v[self.n] * a).collect();
         [&v[..self.n], &self.setting.spread(&change)].concat()
     }
 
@@ -83,12 +83,13 @@ impl<'a> OnBranchPoints<'a> {
         let (n, size) = (self.n, self.n + 2);
         self.state = u[..n].to_vec();
         self.parameters = self.setting.at(&u[n + 1..]);
-        let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; 2 * n]);
+        let k = self.across.len();
+        let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; k * n]);
         self.setting.linearise(self.batch(), &mut f, &mut fx, &mut fp);
         let mut matrix = vec![0.0; size * size];
         for i in 0..n {
             matrix[i * size..i * size + n].copy_from_slice(&fx[i * n..(i + 1) * n]);
-            matrix[i * size + n] = dot(&fp[2 * i..2 * i + 2], &self.across);
+            matrix[i * size + n] = dot(&fp[k * i..k * (i + 1)], &self.across);
             matrix[i * size + n + 1] = self.left[i];
         }
         for (k, row) in self.right.chunks_exact(n + 1).enumerate() {
@@ -133,11 +134,15 @@ impl Condition for OnBranchPoints<'_> {
     }
 
     fn face(&mut self, along: &[f64]) {
-        let [a, b] = [along[self.n + 1], along[self.n + 2]];
+        // Beyond two parameters the bifurcations are no curve.
+        let [a, b] = match along.get(self.n + 1..) {
+            Some([a, b]) => [*a, *b],
+            _ => return,
+        };
         let length = a.hypot(b);
         if length > 0.0 {
             // The null vectors belong to the previous λ.
-            self.across = [-b / length, a / length];
+            self.across = vec![-b / length, a / length];
         }
     }
 

@@ -43,8 +43,8 @@ pub struct OnCycleBranchPoints<'a> {
     n: usize,
     forcing_periods: u32,
     times: Vec<f64>,
-    /// Direction of λ in the last two free parameters.
-    across: [f64; 2],
+    /// Direction of λ in the free parameters, which follow the amplitude of the unfolding.
+    across: Vec<f64>,
     /// Bordered system. Scalars: T₁ if the cycle is free, ℓ, the coefficient of d. Rows: the integral, then both rows
     /// of C.
     system: System,
@@ -86,10 +86,12 @@ impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
 }
 
 impl<'a> OnCycleBranchPoints<'a> {
-    /// Creates the condition on the mesh of `cycle`; the last two free parameters of the setting span the plane.
+    /// Creates the condition on the mesh of `cycle`; the first free parameter of the
+    /// setting is the amplitude of the unfolding.
     pub fn new(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
         let (scheme, n) = (Scheme::new(cycle.degree), setting.field.dim());
         let scalars = 2 + usize::from(cycle.forcing_periods == 0);
+        let across = (0..setting.freedom() - 1).map(|k| if k == 0 { 1.0 } else { 0.0 }).collect();
         let mut own = OnCycleBranchPoints {
             system: System::new(n, &scheme.end, scalars),
             setting,
@@ -98,7 +100,7 @@ impl<'a> OnCycleBranchPoints<'a> {
             n,
             forcing_periods: cycle.forcing_periods,
             times: Vec::new(),
-            across: [1.0, 0.0],
+            across,
             phase: Vec::new(),
             left: Vec::new(),
             left_phase: 0.3,
@@ -187,9 +189,8 @@ impl<'a> OnCycleBranchPoints<'a> {
 
     /// Change of all parameters for a change of λ.
     fn spread(&self, change: f64) -> Vec<f64> {
-        let k = self.setting.freedom();
-        let mut all = vec![0.0; k];
-        all[k - 2..].iter_mut().zip(self.across).for_each(|(own, a)| *own = change * a);
+        let mut all = vec![0.0; self.setting.freedom()];
+        all[1..].iter_mut().zip(&self.across).for_each(|(own, a)| *own = change * a);
         self.setting.spread(&all)
     }
 
@@ -299,7 +300,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         let mut out = Vec::with_capacity((m + 1) * n * width);
         for row in by.chunks_exact(from) {
             out.extend_from_slice(&row[..n + first]);
-            out.push(self.across.iter().zip(&row[from - 2..]).map(|(a, v)| a * v).sum());
+            out.push(self.across.iter().zip(&row[from - self.across.len()..]).map(|(a, v)| a * v).sum());
         }
         let end = out.split_off(m * n * width);
         let left: Vec<f64> = piecewise::identity(n, width).iter().map(|entry| left * entry).collect();
@@ -394,11 +395,15 @@ impl Condition for OnCycleBranchPoints<'_> {
     }
 
     fn face(&mut self, along: &[f64]) {
+        // Beyond two parameters the bifurcations are no curve.
+        if self.across.len() != 2 {
+            return;
+        }
         let [a, b] = [along[along.len() - 2], along[along.len() - 1]];
         let length = a.hypot(b);
         if length > 0.0 {
             // The null vectors belong to the previous λ.
-            self.across = [-b / length, a / length];
+            self.across = vec![-b / length, a / length];
         }
     }
 

@@ -171,6 +171,17 @@ impl VectorField for Unfolded<'_> {
         self.field.outputs(self.parts(at).0, out);
     }
 
+    fn outputs_along(&self, at: Batch, direction: &[f64], out: &mut [f64]) {
+        // The outputs do not depend on b.
+        let own = (self.dim() + self.field.parameter_count()) * at.lanes;
+        self.field.outputs_along(self.parts(at).0, &direction[..own], out);
+    }
+
+    fn time_unit_along(&self, parameters: &[f64], change: &[f64]) -> f64 {
+        let k = self.field.parameter_count();
+        self.field.time_unit_along(&parameters[..k], &change[..k])
+    }
+
     fn switch_count(&self) -> usize {
         self.field.switch_count()
     }
@@ -200,10 +211,12 @@ impl VectorField for Unfolded<'_> {
     }
 }
 
-/// Cycle problem of f + b d with unknowns u = (profile, T, b, λ₁, λ₂); its points do not contain b.
+/// Cycle problem of f + b d with unknowns u = (profile, T, b, λ₁ … λ_k); its points do not contain b.
 pub struct UnfoldedCycles<'a> {
     cycles: CycleProblem<'a>,
     parameters: usize,
+    /// Number of free parameters, b not counted.
+    free: usize,
     /// T at the last reference.
     period: f64,
 }
@@ -222,9 +235,10 @@ impl<'a> UnfoldedCycles<'a> {
         }
     }
 
-    /// Creates the problem of f + b d from its cycle problem; `parameters` is the number of parameters of f.
-    pub fn new(cycles: CycleProblem<'a>, parameters: usize) -> UnfoldedCycles<'a> {
-        UnfoldedCycles { cycles, parameters, period: 1.0 }
+    /// Creates the problem of f + b d from its cycle problem; `parameters` is the number of parameters of f, of
+    /// which `free` are free.
+    pub fn new(cycles: CycleProblem<'a>, parameters: usize, free: usize) -> UnfoldedCycles<'a> {
+        UnfoldedCycles { cycles, parameters, free, period: 1.0 }
     }
 }
 
@@ -238,7 +252,7 @@ impl ZeroProblem for UnfoldedCycles<'_> {
     }
 
     fn anchor(&mut self, u: &[f64]) {
-        self.period = u[u.len() - 4];
+        self.period = u[u.len() - self.free - 2];
         self.cycles.anchor(u);
     }
 
@@ -318,7 +332,7 @@ impl ZeroProblem for UnfoldedCycles<'_> {
     /// the discretisation error, a thousand times that of Newton's method
     /// ([`crate::continuation::Settings::newton_tolerance`]).
     fn departure(&self, u: &[f64]) -> f64 {
-        1e-3 * (u[u.len() - 3] * self.period).abs()
+        1e-3 * (u[u.len() - self.free - 1] * self.period).abs()
     }
 
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {

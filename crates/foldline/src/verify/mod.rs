@@ -27,8 +27,8 @@ mod tests;
 mod variational;
 
 use crate::diagram::{Branch, Diagram, Kind, Solution};
-use crate::explore::System;
-use crate::problem::{Axis, Setting, Tie};
+use crate::explore::{System, axis_of};
+use crate::problem::{Axis, Setting};
 
 /// Quantity that is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -211,44 +211,18 @@ fn accuracies(tolerance: f64) -> [f64; 2] {
     [fine, 10.0 * fine]
 }
 
-/// Setting with the free parameters of a branch. Homotopy runs change several parameters in proportion.
+/// Setting with the free parameters of a branch.
 fn setting<'a>(system: &'a System, branch: &Branch) -> Setting<'a> {
     let parameters = branch.points.first().map(|point| point.parameters.clone()).unwrap_or_default();
-    let axis = |index: usize| Axis::new(index, system.unit(index));
     let axes = match branch.held {
-        Some((_, other)) => vec![axis(other), axis(branch.free)],
+        Some((_, other)) => [other, branch.free].map(|index| Axis::new(index, system.unit(index))).to_vec(),
         None if !branch.also.is_empty() => {
-            branch.also.iter().map(|(index, _)| *index).chain([branch.free]).map(axis).collect()
+            let all = branch.also.iter().map(|(index, _)| *index).chain([branch.free]);
+            all.map(|index| Axis::new(index, system.unit(index))).collect()
         }
-        None => match branch.points.iter().map(|p| change(&parameters, &p.parameters)).max_by(larger) {
-            Some(Some((main, changes))) => {
-                let ties = changes.iter().filter(|(index, _)| *index != main.0).map(|(index, by)| Tie {
-                    index: *index,
-                    slope: by / main.1,
-                    offset: parameters[*index] - by / main.1 * parameters[main.0],
-                });
-                vec![Axis { ties: ties.collect(), ..axis(main.0) }]
-            }
-            _ => vec![axis(branch.free)],
-        },
+        None => vec![axis_of(system, branch)],
     };
     Setting { field: system.field, scales: &system.scales, parameters, axes }
-}
-
-/// Parameter and its change.
-type Change = (usize, f64);
-
-/// Largest change between two sets of parameters, and all changes.
-fn change(from: &[f64], to: &[f64]) -> Option<(Change, Vec<Change>)> {
-    let all: Vec<Change> =
-        from.iter().zip(to).map(|(a, b)| b - a).enumerate().filter(|(_, by)| by.abs() > 1e-13).collect();
-    let main = all.iter().copied().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
-    Some((main, all))
-}
-
-fn larger(a: &Option<(Change, Vec<Change>)>, b: &Option<(Change, Vec<Change>)>) -> std::cmp::Ordering {
-    let size = |change: &Option<(Change, Vec<Change>)>| change.as_ref().map_or(0.0, |(main, _)| main.1.abs());
-    size(a).total_cmp(&size(b))
 }
 
 /// True if a branch is a curve of cycles (its points are).
