@@ -217,6 +217,14 @@ pub trait ZeroProblem {
         self.transfer(u, from, to)
     }
 
+    /// The solution between close ones on the current mesh that interpolation with these weights, which add up to 1,
+    /// yields; as accurate where a solution is not smooth.
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.unknowns()];
+        weights.iter().zip(solutions).for_each(|(weight, own)| crate::linalg::axpy(*weight, own, &mut sum));
+        sum
+    }
+
     /// A mesh on which `u` would meet `tolerance`, or `None` if it does on the current one. The last factorisation must
     /// be one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
@@ -354,6 +362,12 @@ pub trait Monitor: Send + Sync {
     /// Two events of one kind with the same label at one place are one event.
     fn label(&self) -> usize {
         0
+    }
+
+    /// A function with the zero of the value that is smooth along the branch, also where eigenvalues or multipliers meet
+    /// and become complex; `None` if the value itself is meant.
+    fn smooth(&self, _at: &Point) -> Option<f64> {
+        None
     }
 
     /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but

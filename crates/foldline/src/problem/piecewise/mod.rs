@@ -145,6 +145,21 @@ impl<'a> PiecewiseFlow<'a> {
         Ok(all)
     }
 
+    /// What the flow from `x` over an interval requires at the inner nodes, `[m][n]`, and its right end. `nodes` is a
+    /// polynomial close to it, and `orbit` the profile and the mesh to which the interval belongs.
+    pub fn through(
+        &self,
+        interval: usize,
+        x: &[f64],
+        ends: [f64; 2],
+        nodes: &[f64],
+        [profile, mesh]: [&[f64]; 2],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (_, sizes) = self.suspects(profile, mesh);
+        let found = self.along(interval, x, ends, nodes, &sizes).ok()?;
+        Some((found.inner(self.scheme, ends), found.end))
+    }
+
     /// The intervals in which a switch could vanish, and the largest value of every switch: it changes by as much as its
     /// smallest value at the nodes, or f leads to its zero in the time of the interval, which the nodes of an orbit that
     /// slides do not show.
