@@ -276,6 +276,21 @@ fn a_symmetry_is_lost_between_two_stops() {
     assert!(stated.iter().all(|error| *error < 2e-6), "{stated:?}");
 }
 
+/// One contact ends and another begins at p = -0.0005 and 0.0005, in one step: the switch is a function of time with the
+/// maxima p and -p, less 0.0005.
+#[test]
+fn two_grazings_of_one_switch_within_a_step_are_both_found() {
+    let model = "name = \"two\"\n[parameters]\np = -0.5\n[forcing]\nfrequency = \"1\"\n[states.x]\n\
+        equation = \"max(cos(2*t) + p*cos(t) - 1.0005, 0) - x\"\nrange = [-2, 2]\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+        from = \"s\"\nfree = \"p\"\nrange = [-0.5, 0.5]\n";
+    let diagram = run(model, study);
+    let own = branch(&diagram, "b");
+    has(own, &[(Kind::Grazing, -0.0005), (Kind::Grazing, 0.0005)], 1e-8);
+    let contacts: Vec<&str> = own.special.iter().filter_map(|s| s.remark.split(" at ").next()).collect();
+    assert_eq!(contacts, ["contacts 1 → 0", "contacts 0 → 1"]);
+}
+
 /// At mu = 0 three surfaces meet. Beyond, 3.1875 x = 1.25 mu and y = mu/2 - 0.375 x.
 #[test]
 fn an_equilibrium_passes_a_corner_of_three_surfaces() {

@@ -327,6 +327,23 @@ pub enum Sight {
     Everything,
 }
 
+/// A single event between two points, and the values of its monitor there.
+pub struct Separate<'m> {
+    /// Monitor of the event alone.
+    pub monitor: Box<dyn Monitor + 'm>,
+    /// Its values at both points.
+    pub values: [f64; 2],
+}
+
+/// What a monitor that tells its events apart sees between two points.
+#[derive(Default)]
+pub struct Events<'m> {
+    /// The events that both ends show.
+    pub seen: Vec<Separate<'m>>,
+    /// Shares of the way at which a value may have passed zero and be about to return.
+    pub turns: Vec<f64>,
+}
+
 /// A scalar test function along the branch; a change of its sign between two points indicates a special point.
 pub trait Monitor: Send + Sync {
     /// Kind of special point at which the sign changes.
@@ -357,6 +374,17 @@ pub trait Monitor: Send + Sync {
     /// True if the zero may still be confirmed, judging by the nearby point `at`.
     fn possible(&self, _at: &Point) -> bool {
         true
+    }
+
+    /// The single events between two points, `length` apart along the branch in the direction of growing positions, if
+    /// several may occur within a step.
+    fn separately<'m>(&'m self, _left: &Point, _right: &Point, _length: f64) -> Option<Events<'m>> {
+        None
+    }
+
+    /// What happens at a located event; `forwards` is false if it was passed towards smaller positions.
+    fn remark(&self, _at: &Point, _forwards: bool) -> String {
+        String::new()
     }
 
     /// Two events of one kind with the same label at one place are one event.
