@@ -276,6 +276,40 @@ fn a_symmetry_is_lost_between_two_stops() {
     assert!(stated.iter().all(|error| *error < 2e-6), "{stated:?}");
 }
 
+/// Stops up to 1e5 times as stiff as the spring bend the branch within 1e-10 of the grazing. Grazings: A² = (1 - w²)² +
+/// (c w)² at half the amplitude A. Fold and doubling at k = 1000: closed form of cycles with one contact.
+#[test]
+fn stiff_stops_are_met_from_the_side_without_contact() {
+    let model = |k: f64| {
+        format!(
+            "name = \"stop\"\n[parameters]\nw = 0.6\nk = {k}\n[forcing]\nfrequency = \"w\"\n[states.x]\n\
+             equation = \"v\"\nrange = [-1, 1]\n[states.v]\n\
+             equation = \"0.2*cos(w*t) - 0.1*v - x - if(x > 0.5, k*(x - 0.5), 0)\"\nrange = [-1, 1]\n"
+        )
+    };
+    let study = |range: &str| {
+        format!(
+            "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+             from = \"s\"\nfree = \"w\"\nrange = {range}\n"
+        )
+    };
+    let grazing = (Kind::Grazing, 0.779_531_520_762_767_9);
+    let doubling = (Kind::PeriodDoubling, 0.975_417_246_697);
+    let fold = (Kind::Fold, 1.635_675_793_473);
+    let cases = [(1e3, "[0.5, 2]", vec![grazing, doubling, fold]), (1e4, "[0.5, 0.8]", vec![grazing])];
+    for (k, range, known) in cases {
+        let diagram = run(&model(k), &study(range));
+        let found = branch(&diagram, "b");
+        for (kind, at) in known {
+            let near = |s: &&SpecialPoint| s.kind == kind && (s.point.parameters[0] - at).abs() < s.error.min(1e-7);
+            assert_eq!(found.special.iter().filter(near).count(), 1, "{k} {kind} {at}");
+        }
+        // The multiplier passes -1 once beyond the grazing.
+        let beside = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && s.point.parameters[0] < 0.79;
+        assert_eq!(found.special.iter().filter(beside).count(), 1, "{k}");
+    }
+}
+
 /// One contact ends and another begins at p = -0.0005 and 0.0005, in one step: the switch is a function of time with the
 /// maxima p and -p, less 0.0005.
 #[test]
