@@ -6,6 +6,7 @@ mod responses;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
+use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
@@ -86,7 +87,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (diagram, model) =
         (shown.as_ref().unwrap_or(&run.diagram), conversion.as_ref().map_or(&run.model, |own| own.model()));
     let table = match typed.what() {
-        What::Points => columns::points(diagram, model, &kept),
+        What::Points => columns::points(diagram, model, &contacts(typed, &run)?, &kept),
         What::Branches => columns::branches(diagram, model, &kept),
         What::Special => columns::special(diagram, model, &kept),
         What::Responses => responses::responses(diagram, model),
@@ -99,6 +100,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         tell_short(&run.diagram, &run.plan, &run.model)?;
     }
     Ok(Outcome::Done)
+}
+
+/// The switchings of the cycles of a run, which are read off their profiles.
+fn contacts(typed: &Typed, run: &Run) -> Result<columns::Contacts, Failure> {
+    if run.model.switch_count() == 0 {
+        return Ok(columns::Contacts::default());
+    }
+    let whole = read(&typed.folder, Part::Everything)?;
+    Ok(columns::contacts(&whole.diagram, &whole.model))
 }
 
 /// Units given with `--unit NAME=UNIT`; `None` without any.
