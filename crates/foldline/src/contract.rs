@@ -221,7 +221,9 @@ pub trait ZeroProblem {
     /// yields; as accurate where a solution is not smooth.
     fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.unknowns()];
-        weights.iter().zip(solutions).for_each(|(weight, own)| crate::linalg::axpy(*weight, own, &mut sum));
+        for (weight, own) in weights.iter().zip(solutions) {
+            sum.iter_mut().zip(*own).for_each(|(sum, u)| *sum += weight * u);
+        }
         sum
     }
 
@@ -335,7 +337,7 @@ pub struct Separate<'m> {
     pub values: [f64; 2],
 }
 
-/// What a monitor that tells its events apart sees between two points.
+/// Events that a monitor which tells them apart sees between two points.
 #[derive(Default)]
 pub struct Events<'m> {
     /// The events that both ends show.
@@ -382,7 +384,7 @@ pub trait Monitor: Send + Sync {
         None
     }
 
-    /// What happens at a located event; `forwards` is false if it was passed towards smaller positions.
+    /// Words for a located event; `forwards` is false if it was passed towards smaller positions.
     fn remark(&self, _at: &Point, _forwards: bool) -> String {
         String::new()
     }

@@ -164,7 +164,7 @@ impl<'a> PiecewiseFlow<'a> {
         Ok(all)
     }
 
-    /// What the flow from `x` over an interval requires at the inner nodes, `[m][n]`, and its right end. `nodes` is a
+    /// Values that the flow from `x` over an interval requires at the inner nodes, `[m][n]`, and its right end. `nodes` is a
     /// polynomial close to it, and `orbit` the profile and the mesh to which the interval belongs.
     pub fn through(
         &self,

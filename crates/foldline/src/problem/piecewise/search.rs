@@ -52,7 +52,7 @@ pub(super) struct Trial<'a> {
     pub whole: f64,
 }
 
-/// What a switch does on a trial.
+/// Course of a switch on a trial.
 #[derive(Debug)]
 pub(super) enum Course {
     /// It vanishes between these places.
