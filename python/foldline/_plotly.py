@@ -27,6 +27,8 @@ _SYMBOLS = {
     "diamond": "diamond",
     "triangle": "triangle-up",
     "nabla": "triangle-down",
+    "right": "triangle-right",
+    "left": "triangle-left",
     "cross": "x",
     "plus": "cross",
     "star": "star",

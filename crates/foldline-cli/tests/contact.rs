@@ -235,8 +235,94 @@ fn branches_that_cross_on_piecewise_cycles_are_switched_to() {
     let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
         from = \"s\"\nfree = \"p\"\nrange = [-0.6, 0.5]\nswitch = { branch-point = 1 }\n";
     let diagram = run(model, study);
-    assert!(branch(&diagram, "b").special.iter().any(|s| s.kind == Kind::BranchPoint));
+    // The half map has a multiplier -1. It is linear between the reversals, so that this is a single equation.
+    has(branch(&diagram, "b"), &[(Kind::BranchPoint, -0.519_105_100_548_616)], 2e-7);
     assert!(branch(&diagram, "b/branch-point-1").points.len() > 5);
+}
+
+/// x' = p s - x with s = ±1 in either half of the period: the largest value p tanh(π/2) is at the switch, where x has a
+/// corner.
+#[test]
+fn the_largest_value_at_a_corner_of_the_orbit_is_that_of_the_corner() {
+    let model = "name = \"square wave\"\n[parameters]\np = 1\n[forcing]\nfrequency = 1\n[states.x]\n\
+        equation = \"p*sign(sin(t)) - x\"\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+        free = \"p\"\nrange = [0.5, 2]\n";
+    let diagram = run(model, study);
+    for point in &branch(&diagram, "b").points {
+        let known = point.parameters[0] * std::f64::consts::FRAC_PI_2.tanh();
+        let off = (point.ranges[0][1] - known).abs().max((point.ranges[0][0] + known).abs());
+        assert!(off < 1e-9 && off < point.trust.discretisation, "{:?}: off {off}", point.parameters);
+    }
+}
+
+/// Symmetric cycles between two stops lose their symmetry; the half map of event-located integration at 1e-12 has the
+/// multiplier -1 there. Two of the multipliers have met shortly before.
+#[test]
+fn a_symmetry_is_lost_between_two_stops() {
+    let model = "name = \"gap\"\n[parameters]\nw = 0.36\n[forcing]\nfrequency = \"w\"\n[states.x]\nequation = \"v\"\n\
+        range = [-2, 2]\n[states.v]\nequation = \"0.9*cos(w*t) - 0.04*v - x - 30*(x - (abs(x + 0.5) - abs(x - 0.5))/2)\"\n\
+        range = [-2, 2]\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+        from = \"s\"\nfree = \"w\"\nrange = [0.34, 0.5]\n";
+    let diagram = run(model, study);
+    let own = branch(&diagram, "b");
+    let near = |s: &&SpecialPoint| {
+        let off = (s.point.parameters[0] - 0.368_315_577_8).abs();
+        s.kind == Kind::BranchPoint && off < s.error.min(1e-7)
+    };
+    assert_eq!(own.special.iter().filter(near).count(), 1);
+    let stated: Vec<f64> = own.special.iter().map(|s| s.error).collect();
+    assert!(stated.iter().all(|error| *error < 2e-6), "{stated:?}");
+}
+
+/// Stops up to 1e5 times as stiff as the spring bend the branch within 1e-10 of the grazing. Grazings: A² = (1 - w²)² +
+/// (c w)² at half the amplitude A. Fold and doubling at k = 1000: closed form of cycles with one contact.
+#[test]
+fn stiff_stops_are_met_from_the_side_without_contact() {
+    let model = |k: f64| {
+        format!(
+            "name = \"stop\"\n[parameters]\nw = 0.6\nk = {k}\n[forcing]\nfrequency = \"w\"\n[states.x]\n\
+             equation = \"v\"\nrange = [-1, 1]\n[states.v]\n\
+             equation = \"0.2*cos(w*t) - 0.1*v - x - if(x > 0.5, k*(x - 0.5), 0)\"\nrange = [-1, 1]\n"
+        )
+    };
+    let study = |range: &str| {
+        format!(
+            "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+             from = \"s\"\nfree = \"w\"\nrange = {range}\n"
+        )
+    };
+    let grazing = (Kind::Grazing, 0.779_531_520_762_767_9);
+    let doubling = (Kind::PeriodDoubling, 0.975_417_246_697);
+    let fold = (Kind::Fold, 1.635_675_793_473);
+    let cases = [(1e3, "[0.5, 2]", vec![grazing, doubling, fold]), (1e4, "[0.5, 0.8]", vec![grazing])];
+    for (k, range, known) in cases {
+        let diagram = run(&model(k), &study(range));
+        let found = branch(&diagram, "b");
+        for (kind, at) in known {
+            let near = |s: &&SpecialPoint| s.kind == kind && (s.point.parameters[0] - at).abs() < s.error.min(1e-7);
+            assert_eq!(found.special.iter().filter(near).count(), 1, "{k} {kind} {at}");
+        }
+        // The multiplier passes -1 once beyond the grazing.
+        let beside = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && s.point.parameters[0] < 0.79;
+        assert_eq!(found.special.iter().filter(beside).count(), 1, "{k}");
+    }
+}
+
+/// One contact ends and another begins at p = -0.0005 and 0.0005, in one step: the switch is a function of time with the
+/// maxima p and -p, less 0.0005.
+#[test]
+fn two_grazings_of_one_switch_within_a_step_are_both_found() {
+    let model = "name = \"two\"\n[parameters]\np = -0.5\n[forcing]\nfrequency = \"1\"\n[states.x]\n\
+        equation = \"max(cos(2*t) + p*cos(t) - 1.0005, 0) - x\"\nrange = [-2, 2]\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+        from = \"s\"\nfree = \"p\"\nrange = [-0.5, 0.5]\n";
+    let diagram = run(model, study);
+    let own = branch(&diagram, "b");
+    has(own, &[(Kind::Grazing, -0.0005), (Kind::Grazing, 0.0005)], 1e-8);
+    let contacts: Vec<&str> = own.special.iter().filter_map(|s| s.remark.split(" at ").next()).collect();
+    assert_eq!(contacts, ["contacts 1 → 0", "contacts 0 → 1"]);
 }
 
 /// At mu = 0 three surfaces meet. Beyond, 3.1875 x = 1.25 mu and y = mu/2 - 0.375 x.

@@ -1,9 +1,11 @@
 //! Cycles that stick and slide: against closed forms and multiple shooting.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point, SpecialPoint};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
+
+const RUB: &str = include_str!("../../../models/overhung-rotor-rub.toml");
 
 /// x'' + c x' + x = f cos(w t) - sign(x').
 fn coulomb(c: f64) -> String {
@@ -139,4 +141,48 @@ fn a_block_without_a_spring_sticks_below_a_known_force() {
     let [sliding] = &diagram.branch("b").unwrap().special[..] else { panic!("one special point") };
     let off = (sliding.point.parameters[0] - 1f64.hypot(std::f64::consts::FRAC_PI_2)).abs();
     assert!(sliding.kind == Kind::Sliding && off < sliding.error && off < 1e-8, "{off}, stated {}", sliding.error);
+}
+
+/// The synchronous rub is an equilibrium of the rotating frame. Its folds and Hopf points are known.
+#[test]
+fn a_rotor_rubs_in_step_with_its_unbalance() {
+    let rows = include_str!("reference/exact_rub.csv").lines().skip(3);
+    for row in rows {
+        let fields: Vec<&str> = row.split(',').collect();
+        let [zeta, mu, omega, radius] = [1, 2, 3, 4].map(|k| fields[k].parse::<f64>().unwrap());
+        let study = format!(
+            "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nstate = {{ u = 0.05, v = 0, du = 0, dv = 0 }}\n\
+             parameters = {{ Omega = 0.5, zeta = {zeta}, mu = {mu} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+             free = \"Omega\"\nrange = [0.3, 5]\n"
+        );
+        let diagram = run(RUB, &study);
+        let branch = diagram.branch("b").unwrap();
+        let off = |s: &SpecialPoint| {
+            (s.point.parameters[0] - omega).abs().max((s.point.ranges[4][1] - radius).abs() / radius)
+        };
+        let own = branch.special.iter().filter(|s| s.kind.name() == fields[0]);
+        let nearest = own.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_else(|| panic!("{row}"));
+        assert!(off(nearest) < 1e-8, "{row}: {:e}", off(nearest));
+    }
+}
+
+/// On the cycles that leave a Hopf point of the rub, the disc whirls backwards until it rolls along the ring: from there on
+/// its surface is at rest for a part of the period, and a multiplier is zero.
+#[test]
+fn a_rotor_that_rubs_comes_to_roll_along_its_ring() {
+    let study = include_str!("../../../studies/exact/rub.toml").replace("../../models/overhung-rotor-rub.toml", "m");
+    let study = study.lines().filter(|line| !line.starts_with("model =")).collect::<Vec<_>>().join("\n");
+    let diagram = run(RUB, &study);
+    let whirl = diagram.branch("rub/hopf-1").unwrap();
+    assert!(whirl.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{:?}", whirl.ends);
+    let corners: Vec<&str> =
+        whirl.special.iter().filter(|s| s.kind == Kind::Grazing).map(|s| s.remark.as_str()).collect();
+    assert_eq!(corners.iter().filter(|remark| remark.starts_with("grazing-sliding: non-smooth fold")).count(), 1);
+    let rolls: Vec<&Point> =
+        whirl.points.iter().filter(|point| point.spectrum.iter().any(|z| z.norm() == 0.0)).collect();
+    assert!(rolls.len() > 3);
+    // It rolls exactly where the smallest sliding speed is zero or has been passed.
+    for point in rolls {
+        assert!(point.ranges[5][0] < 1e-6, "{:?}", point.ranges);
+    }
 }

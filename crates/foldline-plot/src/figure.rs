@@ -242,6 +242,10 @@ pub enum Marker {
     Triangle,
     /// ▽
     Nabla,
+    /// ▷
+    Right,
+    /// ◁
+    Left,
     /// ×
     Cross,
     /// +
@@ -268,7 +272,8 @@ impl Marker {
             Kind::GeneralisedHopf | Kind::GeneralisedPeriodDoubling | Kind::Chenciner => Marker::Diamond,
             Kind::DoubleHopf | Kind::DoubleTorus | Kind::Resonance14 => Marker::Square,
             Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
-            Kind::Grazing | Kind::BoundaryEquilibrium => Marker::Nabla,
+            Kind::Grazing => Marker::Right,
+            Kind::BoundaryEquilibrium => Marker::Left,
             Kind::Sliding => Marker::Plus,
             Kind::Peak => Marker::Nabla,
             Kind::Mark => Marker::Dot,

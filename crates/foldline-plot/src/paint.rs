@@ -197,6 +197,8 @@ pub(crate) fn mark(out: &mut String, marker: Marker, [x, y]: [f64; 2], layer: &L
         Marker::Diamond => "<path d=\"M0-5L5 0L0 5L-5 0Z\"/>",
         Marker::Triangle => "<path d=\"M0-5L4.7 3.4H-4.7Z\"/>",
         Marker::Nabla => "<path d=\"M0 5L4.7-3.4H-4.7Z\"/>",
+        Marker::Right => "<path d=\"M5 0L-3.4 4.7V-4.7Z\"/>",
+        Marker::Left => "<path d=\"M-5 0L3.4 4.7V-4.7Z\"/>",
         Marker::Cross => "<path d=\"M-3.8-3.8L3.8 3.8M-3.8 3.8L3.8-3.8\"/>",
         Marker::Plus => "<path d=\"M0-4.6V4.6M-4.6 0H4.6\"/>",
         Marker::Star => "<path d=\"M0-5.4V5.4M-5.4 0H5.4M-3.8-3.8L3.8 3.8M-3.8 3.8L3.8-3.8\"/>",

@@ -30,6 +30,8 @@ pub fn marker(kind: &str) -> &'static str {
         Marker::Diamond => "diamond",
         Marker::Triangle => "triangle",
         Marker::Nabla => "nabla",
+        Marker::Right => "right",
+        Marker::Left => "left",
         Marker::Cross => "cross",
         Marker::Plus => "plus",
         Marker::Star => "star",

@@ -260,6 +260,16 @@ pub trait ZeroProblem {
         self.transfer(u, from, to)
     }
 
+    /// The solution between close ones on the current mesh that interpolation with these weights, which add up to 1,
+    /// yields; as accurate where a solution is not smooth.
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        let mut sum = vec![0.0; self.unknowns()];
+        for (weight, own) in weights.iter().zip(solutions) {
+            sum.iter_mut().zip(*own).for_each(|(sum, u)| *sum += weight * u);
+        }
+        sum
+    }
+
     /// A mesh on which `u` would meet `tolerance`, or `None` if it does on the current one. The last factorisation must
     /// be one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
@@ -362,6 +372,23 @@ pub enum Sight {
     Everything,
 }
 
+/// A single event between two points, and the values of its monitor there.
+pub struct Separate<'m> {
+    /// Monitor of the event alone.
+    pub monitor: Box<dyn Monitor + 'm>,
+    /// Its values at both points.
+    pub values: [f64; 2],
+}
+
+/// Events that a monitor which tells them apart sees between two points.
+#[derive(Default)]
+pub struct Events<'m> {
+    /// The events that both ends show.
+    pub seen: Vec<Separate<'m>>,
+    /// Shares of the way at which a value may have passed zero and be about to return.
+    pub turns: Vec<f64>,
+}
+
 /// A scalar test function along the branch; a change of its sign between two points indicates a special point.
 pub trait Monitor: Send + Sync {
     /// Kind of special point at which the sign changes.
@@ -394,9 +421,26 @@ pub trait Monitor: Send + Sync {
         true
     }
 
+    /// The single events between two points, `length` apart along the branch in the direction of growing positions, if
+    /// several may occur within a step.
+    fn separately<'m>(&'m self, _left: &Point, _right: &Point, _length: f64) -> Option<Events<'m>> {
+        None
+    }
+
+    /// Words for a located event; `forwards` is false if it was passed towards smaller positions.
+    fn remark(&self, _at: &Point, _forwards: bool) -> String {
+        String::new()
+    }
+
     /// Two events of one kind with the same label at one place are one event.
     fn label(&self) -> usize {
         0
+    }
+
+    /// A function with the zero of the value that is smooth along the branch, also where eigenvalues or multipliers meet
+    /// and become complex; `None` if the value itself is meant.
+    fn smooth(&self, _at: &Point) -> Option<f64> {
+        None
     }
 
     /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but

@@ -2,9 +2,11 @@
 
 use super::{Cell, Column, Style, Table};
 use foldline::contract::VectorField;
-use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown};
+use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown, Solution};
 use foldline::model::Model;
+use foldline::special::phases;
 use foldline::special::quantity::{Quantity, appended};
+use std::collections::HashMap;
 
 /// Largest number of coefficients of a normal form: that of a double Hopf point.
 const COEFFICIENTS: usize = 6;
@@ -53,11 +55,12 @@ pub fn special(
 }
 
 /// Table of all accepted points: branch, position, every parameter, period, extremes and averages of states and
-/// outputs, accuracy, work, and multipliers (eigenvalues).
+/// outputs, accuracy, work, multipliers (eigenvalues), and the columns of [`contacts`].
 pub fn points(
     diagram: &Diagram,
     model: &Model,
     record: &[(String, Quantity)],
+    contacts: &Contacts,
     kept: &dyn Fn(&Branch) -> bool,
 ) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
@@ -80,6 +83,8 @@ pub fn points(
     columns.extend(sizes.map(|name| column(name, Style::Size)));
     columns.extend(WORK.map(|name| column(name, Style::Number)));
     columns.push(column("multipliers", Style::Word));
+    let others = contacts.columns.len();
+    columns.extend(contacts.columns.iter().map(|(name, style)| column(name, *style)));
     let row = |branch: &Branch, point: &Point| {
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Count(point.position)];
         row.extend(place_cells(point, model));
@@ -100,6 +105,10 @@ pub fn points(
         // A boundary-value problem has no multipliers.
         let spectrum = if branch.family == Family::Arc { Vec::new() } else { point.spectrum.clone() };
         row.push(Cell::Spectrum(spectrum));
+        match contacts.cells.get(&(branch.name.clone(), point.position)) {
+            Some(found) => row.extend(found.iter().map(Known::cell)),
+            None => row.extend((0..others).map(|_| Cell::Empty)),
+        }
         row
     };
     let shown = diagram.branches.iter().filter(|b| kept(b));
@@ -119,6 +128,60 @@ fn recorded_cells<'r>(
 ) -> impl Iterator<Item = Cell> + 'r {
     let value = |index: usize| appended(index, model).of(point).filter(|value| value.is_finite());
     (0..record.len()).map(move |index| value(index).map_or(Cell::Empty, Cell::Number))
+}
+
+/// A value of [`Contacts`].
+pub enum Known {
+    Count(usize),
+    Number(f64),
+    Text(String),
+}
+
+impl Known {
+    fn cell(&self) -> Cell {
+        match self {
+            Known::Count(value) => count(*value),
+            Known::Number(value) => Cell::Number(*value),
+            Known::Text(text) => Cell::Word(text.clone()),
+        }
+    }
+}
+
+/// Columns about the switchings of cycles, and their values by branch and position.
+#[derive(Default)]
+pub struct Contacts {
+    columns: Vec<(String, Style)>,
+    cells: HashMap<(String, i64), Vec<Known>>,
+}
+
+/// For every switch h of a model the number of phases per period in which h > 0 and their share of the period, and the
+/// sequence of all phases. The points need their profiles.
+pub fn contacts(diagram: &Diagram, model: &Model) -> Contacts {
+    let switches = 0..model.switch_count();
+    if switches.is_empty() {
+        return Contacts::default();
+    }
+    let named = |switch: usize| model.switch_name(switch);
+    let mut columns: Vec<(String, Style)> = switches
+        .clone()
+        .flat_map(|k| [format!("phases({} > 0)", named(k)), format!("share({} > 0)", named(k))])
+        .map(|name| (name, Style::Number))
+        .collect();
+    columns.push(("sequence".into(), Style::Word));
+    let of = |point: &Point| -> Option<Vec<Known>> {
+        let Solution::Cycle(cycle) = &point.solution else { return None };
+        let all = phases::phases(model, &point.parameters, cycle);
+        if all.is_empty() {
+            return None;
+        }
+        let numbers = switches.clone().flat_map(|k| {
+            [Known::Count(phases::times_positive(&all, k)), Known::Number(phases::share_positive(&all, k))]
+        });
+        Some(numbers.chain([Known::Text(phases::sequence(model, &all))]).collect())
+    };
+    let points = diagram.branches.iter().flat_map(|branch| branch.points.iter().map(move |point| (branch, point)));
+    let cells = points.filter_map(|(branch, point)| Some(((branch.name.clone(), point.position), of(point)?)));
+    Contacts { cells: cells.collect(), columns }
 }
 
 /// Names of the work counters, in the order of [`work`].

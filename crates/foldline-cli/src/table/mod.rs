@@ -114,7 +114,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (diagram, model) =
         (shown.as_ref().unwrap_or(&run.diagram), conversion.as_ref().map_or(&run.model, |own| own.model()));
     let table = match typed.what() {
-        What::Points => columns::points(diagram, model, &record, &kept),
+        What::Points => columns::points(diagram, model, &record, &contacts(typed, &run)?, &kept),
         What::Branches => columns::branches(diagram, model, &kept),
         What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
@@ -128,6 +128,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         tell_short(&run.diagram, &run.plan, &run.model)?;
     }
     Ok(Outcome::Done)
+}
+
+/// The switchings of the cycles of a run, which are read off their profiles.
+fn contacts(typed: &Typed, run: &Run) -> Result<columns::Contacts, Failure> {
+    if run.model.switch_count() == 0 {
+        return Ok(columns::Contacts::default());
+    }
+    let whole = read(&typed.folder, Part::Everything)?;
+    Ok(columns::contacts(&whole.diagram, &whole.model))
 }
 
 /// Units given with `--unit NAME=UNIT`; `None` without any.

@@ -165,7 +165,7 @@ pub fn follow(
                     coarse += usize::from(matches!(why, Failure::Mesh(_)));
                     let spent = work(cost.factorisations, &left.mesh);
                     let used_up = allowance.is_used_up(spent);
-                    if step < walk.settings.min_step || coarse == COARSE || used_up {
+                    if step < walk.shortest() || coarse == COARSE || used_up {
                         // The matrix may be singular at the bound itself. The remaining distance is then less than the
                         // tolerance.
                         let singular = matches!(why, Failure::Singular);
@@ -200,7 +200,7 @@ pub fn follow(
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
         let factor = walk.settings.target_angle / (trend * angle).max(1e-12);
         let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
-        step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
+        step = (length * factor).clamp(walk.shortest(), walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         let strange = walk.settings.stability && is_unexplained(&found);
         let spent = work(cost.factorisations, &right.mesh);
@@ -293,6 +293,13 @@ impl Follow<'_> {
             Kind::BranchPoint if self.settings.reflections.len() < 2 => CROSSING,
             _ => f64::INFINITY,
         }
+    }
+
+    /// Smallest step. A stop of stiffness k bends a branch within a distance of the order of k⁻², measured in the
+    /// stiffness of the spring, when it is first touched.
+    fn shortest(&self) -> f64 {
+        const STIFF: f64 = 1e-3;
+        if self.problem.is_switched() { STIFF * self.settings.min_step } else { self.settings.min_step }
     }
 
     /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,

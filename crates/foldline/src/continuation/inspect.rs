@@ -284,8 +284,8 @@ impl Follow<'_> {
         if !explained && let Some(together) = self.simultaneous(&stretch, right, fold_test, cost) {
             let count = left.point.unstable as i64;
             let mut out: Vec<Found> = Vec::new();
-            for (kind, mark) in marks {
-                out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
+            for mark in marks {
+                out.push(self.marked_there(mark, count));
             }
             return out.into_iter().chain(together).collect();
         }
@@ -293,8 +293,8 @@ impl Follow<'_> {
         let mut out = Vec::new();
         let total = located.len();
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
-            while let Some((kind, mark)) = marks.next_if(|(_, mark)| mark.distance < found.distance) {
-                out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
+            while let Some(mark) = marks.next_if(|(_, mark, _)| mark.distance < found.distance) {
+                out.push(self.marked_there(mark, count));
             }
             let target = right.point.unstable as i64;
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
@@ -306,8 +306,8 @@ impl Follow<'_> {
             out.push(Found::Special(special));
             count = next;
         }
-        for (kind, mark) in marks {
-            out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
+        for mark in marks {
+            out.push(self.marked_there(mark, count));
         }
         if !explained {
             let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
@@ -474,6 +474,12 @@ impl Follow<'_> {
         let rate = (growth(&after) - growth(&before)).abs() / stretch.length.abs();
         let shift = point.trust.spectrum / rate;
         if shift.is_finite() { shift } else { 0.0 }
+    }
+
+    /// A mark, where `count` eigenvalues or multipliers are unstable.
+    fn marked_there(&mut self, (kind, mark, remark): (Kind, Located, String), count: i64) -> Found {
+        let special = self.special(kind, mark.station, count, count, mark.error);
+        Found::Special(Box::new(SpecialPoint { remark, ..*special }))
     }
 
     pub(super) fn special(

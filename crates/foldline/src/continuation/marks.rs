@@ -13,7 +13,7 @@ use super::corrector::Station;
 use super::follow::Follow;
 use super::inspect::History;
 use super::locate::{Located, Stretch, discrepancy, locate_within};
-use crate::contract::{Monitor, Sight};
+use crate::contract::{Events, Monitor, Sight};
 use crate::diagram::{Cost, Kind, Point};
 
 /// Maximum number of bisections of a bracket in which Newton's method fails; 12 of them shorten it by a factor of 4000.
@@ -41,19 +41,23 @@ impl Follow<'_> {
         history: Option<&History>,
         special: &[(f64, Point)],
         cost: &mut Cost,
-    ) -> Vec<(Kind, Located)> {
+    ) -> Vec<(Kind, Located, String)> {
         let marks = self.marks;
-        let mut found: Vec<(usize, Located)> = Vec::new();
+        let mut found: Vec<(usize, Located, String)> = Vec::new();
         for (k, mark) in marks.iter().enumerate() {
+            if let Some(all) = self.separate_marks(stretch, &**mark, right, special, cost) {
+                found.extend(all.into_iter().map(|(located, remark)| (k, located, remark)));
+                continue;
+            }
             let value = |point: &Point| mark.value(&stretch.left.point, point);
             let (first, last) = (value(&stretch.left.point), value(&right.point));
             let within = special.iter().map(|(distance, point)| (*distance, value(point)));
             let mut known: Vec<(f64, f64)> = [(0.0, first)].into_iter().chain(within).collect();
             known.retain(|(distance, value)| value.is_finite() && (0.0..stretch.length).contains(distance));
             // A value met exactly at the end of a piece, as at a bound, counts; at the beginning it was counted before.
-            if last == 0.0 && first != 0.0 && !found.iter().any(|(_, other)| other.distance == stretch.length) {
+            if last == 0.0 && first != 0.0 && !found.iter().any(|(_, other, _)| other.distance == stretch.length) {
                 let error = 10.0 * self.settings.newton_tolerance();
-                found.push((k, Located { distance: stretch.length, station: right.clone(), error }));
+                found.push((k, Located { distance: stretch.length, station: right.clone(), error }, String::new()));
             } else if last.is_finite() && last != 0.0 {
                 known.push((stretch.length, last));
             }
@@ -65,16 +69,75 @@ impl Follow<'_> {
             }
             known.sort_by(|a, b| a.0.total_cmp(&b.0));
             for pair in known.windows(2).filter(|pair| pair[0].1 != 0.0 && differ(pair[0].1, pair[1].1)) {
-                found.extend(self.mark_between(stretch, &**mark, [pair[0], pair[1]], cost).map(|found| (k, found)));
+                found.extend(
+                    self.mark_between(stretch, &**mark, [pair[0], pair[1]], cost)
+                        .map(|found| (k, found, String::new())),
+                );
             }
         }
         found.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
         let together = SAME * stretch.length;
-        found.dedup_by(|(next, b), (k, a)| {
+        found.dedup_by(|(next, b, _), (k, a, _)| {
             let [own, other] = [&marks[*k], &marks[*next]];
             b.distance - a.distance <= together && own.label() > 0 && own.label() == other.label()
         });
-        found.into_iter().map(|(k, found)| (marks[k].kind(), found)).collect()
+        found.into_iter().map(|(k, found, remark)| (marks[k].kind(), found, remark)).collect()
+    }
+
+    /// The events of a mark of which several may occur on the piece, with remarks; `None` if it is not such a mark.
+    fn separate_marks(
+        &mut self,
+        stretch: &Stretch,
+        mark: &dyn Monitor,
+        right: &Station,
+        special: &[(f64, Point)],
+        cost: &mut Cost,
+    ) -> Option<Vec<(Located, String)>> {
+        let within = special.iter().filter(|(distance, _)| *distance > 0.0 && *distance < stretch.length);
+        let mut known = vec![(0.0, &stretch.left.point), (stretch.length, &right.point)];
+        known.extend(within.map(|(distance, point)| (*distance, point)));
+        known.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut found = Vec::new();
+        for pair in known.windows(2) {
+            let length = pair[1].0 - pair[0].0;
+            let events = mark.separately(pair[0].1, pair[1].1, self.direction * length)?;
+            if events.turns.is_empty() {
+                found.extend(self.each_of(stretch, [pair[0].0, pair[1].0], events, cost));
+                continue;
+            }
+            let mut between = Vec::new();
+            for distance in events.turns.iter().map(|share| pair[0].0 + share * length) {
+                let there = stretch.seen_at(Sight::Everything, self.problem, self.settings, distance, cost);
+                between.extend(there.map(|there| (distance, there.point)));
+            }
+            let mut known = pair.to_vec();
+            known.extend(between.iter().map(|(distance, point)| (*distance, point)));
+            known.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for pair in known.windows(2) {
+                let length = pair[1].0 - pair[0].0;
+                let events = mark.separately(pair[0].1, pair[1].1, self.direction * length)?;
+                found.extend(self.each_of(stretch, [pair[0].0, pair[1].0], events, cost));
+            }
+        }
+        Some(found)
+    }
+
+    /// The events that two ends show, located.
+    fn each_of(
+        &mut self,
+        stretch: &Stretch,
+        ends: [f64; 2],
+        events: Events,
+        cost: &mut Cost,
+    ) -> Vec<(Located, String)> {
+        let mut found = Vec::new();
+        for one in events.seen {
+            let ends = [(ends[0], one.values[0]), (ends[1], one.values[1])];
+            let Some(located) = self.mark_between(stretch, &*one.monitor, ends, cost) else { continue };
+            let remark = one.monitor.remark(&located.station.point, self.direction > 0.0);
+            found.push((located, remark));
+        }
+        found
     }
 
     /// The mark between two distances with values of opposite sign; `None` if the quantity jumps across the requested

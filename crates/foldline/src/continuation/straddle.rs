@@ -4,15 +4,21 @@
 //! digits are left before the bracket is narrow enough. But the branch passes smoothly through the point, so monitor
 //! and unknowns can be interpolated from solutions at four distances around it, none of them close.
 //!
-//! **Equations.** With nodes s₁…s₄ and Lagrange polynomials ℓ_i:
+//! If f switches, distances along the curve are not smooth: they change where a switching passes a node of the mesh, and
+//! with them the tangent. The parameter and the multipliers of the cycle do not depend on the mesh. Branch points of such
+//! cycles, at which the parameter changes along the branch, are therefore interpolated over the parameter, and the
+//! monitor without the slope that it contains.
+//!
+//! **Equations.** With nodes s₁…s₄ (distances, or parameters) and Lagrange polynomials ℓ_i:
 //!
 //!   (1)  Σ_i ℓ_i(s) g(s_i) = 0,   then u = Σ_i ℓ_i(s) u(s_i)
 
-use super::corrector::{Plane, Station, correct, station};
+use super::corrector::{Plane, Station, correct, doubted, station};
 use super::locate::{Located, Stretch, discrepancy};
 use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
-use crate::diagram::Cost;
+use crate::diagram::{Cost, Kind};
+use crate::linalg::larger;
 
 /// Distances between nodes, as shares of the interval, in the order of trial; the last two are used only while Newton's
 /// method still converges to the branch.
@@ -40,10 +46,20 @@ pub fn straddle(
     cost: &mut Cost,
 ) -> Result<Located, Failure> {
     let reference = &stretch.left.point;
-    let value = |found: &Station| monitor.value(reference, &found.point);
-    let mut root = stretch.length * values[0] / (values[0] - values[1]);
+    let over_parameter = problem.is_switched() && !stretch.left.mesh.is_empty() && monitor.kind() == Kind::BranchPoint;
+    let value = |found: &Station| {
+        let slope = if over_parameter { found.point.parameter_slope() } else { 1.0 };
+        slope * monitor.smooth(&found.point).unwrap_or_else(|| monitor.value(reference, &found.point))
+    };
+    let ordered = |nodes: &[f64; 4]| nodes.windows(2).all(|pair| (pair[1] > pair[0]) == (nodes[1] > nodes[0]));
+    // Nodes for the interpolation.
+    let over = |stations: &[Station], distances: [f64; 4]| -> [f64; 4] {
+        let parameters = std::array::from_fn(|k| stations[k].parameter());
+        if over_parameter && ordered(&parameters) { parameters } else { distances }
+    };
+    let mut distance = stretch.length * values[0] / (values[0] - values[1]);
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
-    let mut moved = 0.0;
+    let (mut root, mut moved) = (f64::NAN, f64::NAN);
     for (k, spacing) in SPACINGS.iter().enumerate() {
         // On a mesh, rounding dominates at closer nodes, which are used only if the interpolation is not yet accurate
         // enough.
@@ -53,23 +69,27 @@ pub fn straddle(
         {
             break;
         }
-        let there = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
+        let there = [-1.5, -0.5, 0.5, 1.5].map(|k| distance + k * spacing * stretch.length);
         let found: Result<Vec<Station>, Failure> =
             there.iter().map(|s| stretch.at(problem, settings, *s, cost)).collect();
         let found = found.and_then(|found| {
-            let next = zero(&there, &found.iter().map(value).collect::<Vec<_>>())?;
-            Ok((found, next))
+            let own = over(&found, there);
+            let next = zero(&own, &found.iter().map(value).collect::<Vec<_>>())?;
+            Ok((found, own, next))
         });
-        let next = match found {
-            Ok((found, next)) => {
-                (nodes, stations) = (there, found);
-                next
+        match found {
+            Ok((found, own, next)) => {
+                // A change of coordinate restarts the comparison.
+                moved = (next - root).abs();
+                if !moved.is_finite() {
+                    moved = (own[3] - own[0]).abs();
+                }
+                distance = crate::linalg::dot(&weights(&own, next), &there);
+                (nodes, stations, root) = (own, found, next);
             }
             Err(_) if k >= ON_A_MESH => break,
             Err(why) => return Err(why),
         };
-        moved = (next - root).abs();
-        root = next;
     }
     let values: Vec<f64> = stations.iter().map(value).collect();
     if bend(&nodes, &values, root) > SMOOTH * values[1].abs().max(values[2].abs()) {
@@ -89,8 +109,13 @@ pub fn straddle(
             problem.anchor(&u);
             let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
             correct(problem, settings, &plane, &mut u, cost)?;
-            refined.push(station(problem, u, &row, settings.newton_tolerance(), stretch.direction, cost)?);
+            let mut found = station(problem, u, &row, settings.newton_tolerance(), stretch.direction, cost)?;
+            if over_parameter {
+                doubted(problem, &mut found);
+            }
+            refined.push(found);
         }
+        nodes = over(&refined, nodes);
         root = zero(&nodes, &refined.iter().map(value).collect::<Vec<_>>())?;
         stations = refined;
         let fine = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
@@ -101,7 +126,7 @@ pub fn straddle(
             break;
         }
     }
-    Ok(Located { distance: root, station: coarse, error })
+    Ok(Located { distance, station: coarse, error })
 }
 
 /// Rate of change of the point along the curve between the inner nodes, in the measure of [`discrepancy`].
@@ -156,15 +181,19 @@ fn blend(
         weights(nodes, s).iter().zip(stations).for_each(|(w, own)| crate::linalg::axpy(*w, part(own), &mut sum));
         sum
     };
-    let (u, mut tangent) = (mix(&|own| &own.u), mix(&|own| &own.tangent));
+    let mut tangent = mix(&|own| &own.tangent);
     problem.set_mesh(&mesh);
+    let solutions: Vec<&[f64]> = stations.iter().map(|own| &own.u[..]).collect();
+    let u = problem.blended(&solutions, &weights(nodes, s));
     problem.anchor(&u);
     let norm = problem.dot(&tangent, &tangent).sqrt();
     tangent.iter_mut().for_each(|t| *t /= norm);
     // The matrix may be singular here. The multipliers do not depend on that, but the error estimate does.
     let _ = problem.factorise(&u, &tangent);
     let mut examination = problem.examine(&u);
-    examination.trust.discretisation = stations.iter().map(|own| own.point.trust.discretisation).fold(0.0, f64::max);
+    examination.trust.discretisation = stations.iter().map(|own| own.point.trust.discretisation).fold(0.0, larger);
+    // Next to the singular matrix the estimate grows without a reason in the spectrum.
+    examination.trust.spectrum = stations.iter().map(|own| own.point.trust.spectrum).fold(f64::NAN, f64::min);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
     Station::new(point, u, tangent, mesh)

@@ -573,7 +573,9 @@ impl Growth<'_> {
         let on_surfaces =
             branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium));
         if !on_surfaces && !system.field.iterated() {
-            marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
+            let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
+            let axes: Vec<(usize, f64)> = free.map(|index| (index, system.unit(index))).collect();
+            marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle, &axes));
             if branch.family == Family::Cycle {
                 marks.extend(sliding::monitors(system.field));
             }
@@ -734,8 +736,8 @@ impl Growth<'_> {
         }
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
-                Kind::Grazing if special.remark.starts_with(corner::SLIDING) => special.remark.clone(),
-                Kind::Grazing => grazing::described(system.field, &special.point),
+                Kind::Grazing if special.remark.is_empty() => grazing::described(system.field, &special.point),
+                Kind::Grazing => special.remark.clone(),
                 Kind::Sliding => sliding::described(system.field, &special.point),
                 _ => grazing::on_surface(system.field, &special.point, &special.remark),
             };

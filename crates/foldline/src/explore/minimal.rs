@@ -70,13 +70,15 @@ fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, 
     if !turns_agree(&equal, &system.scales, turns, allowed) {
         return None;
     }
-    let intervals = equal.intervals() / turns;
+    // Intervals that are cut at switchings need not be as many in every turn.
+    let end = 1.0 / turns as f64;
+    let intervals = equal.mesh.iter().position(|t| (t - end).abs() <= 4.0 * f64::EPSILON)?;
     let turn = Cycle {
         period: equal.period / turns as f64,
         forcing_periods: forcing_periods / turns as u32,
         mesh: equal.mesh[..=intervals].iter().map(|t| t * turns as f64).collect(),
         degree,
-        profile: equal.profile[..equal.profile.len() / turns].to_vec(),
+        profile: equal.profile[..intervals * (degree + 1) * equal.dim()].to_vec(),
         gain: equal.gain.iter().map(|gain| gain / turns as f64).collect(),
     };
     let guess = Point { solution: Solution::Cycle(with_exact_end(turn)), ..point.clone() };

@@ -32,6 +32,15 @@ pub fn factorise_even(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(
     pivoted(a, n, pivots, &mut vec![1.0; n])
 }
 
+/// Factorises a matrix like [`factorise`], if its rows have the units of `scales`, which repeat.
+///
+/// # Errors
+/// [`Singular`] if a pivot is zero, not finite, or below 1e-300.
+pub fn factorise_scaled(a: &mut [f64], n: usize, pivots: &mut [usize], scales: &[f64]) -> Result<(), Singular> {
+    let mut rows: Vec<f64> = scales.iter().cycle().take(n).map(|scale| 1.0 / scale).collect();
+    pivoted(a, n, pivots, &mut rows)
+}
+
 /// R of (1), `[n]`.
 fn row_weights(a: &[f64], n: usize) -> Vec<f64> {
     /// Each round halves the remaining logarithms.

@@ -13,6 +13,9 @@ use crate::linalg::panel;
 const PEAKS: usize = 3;
 /// Distance between a peak and its neighbours, in samples, at which refinement stops.
 const CLOSE: f64 = 0.005;
+/// Largest relative change of the second derivative at a round peak, as the neighbours come five times closer. At a
+/// corner it grows five times.
+const ROUND: f64 = 0.5;
 /// Maximum number of refinements: four, plus one for every shift of the peak by up to a sample.
 const ROUNDS: usize = 12;
 
@@ -51,6 +54,7 @@ pub fn of_profile(
                 place: place as f64,
                 spacing: 1.0,
                 reach: f64::INFINITY,
+                curvature: f64::NAN,
             }));
             best.push(top);
         }
@@ -78,6 +82,8 @@ struct Peak {
     spacing: f64,
     /// Upper bound of the peak: the maximum of its parabola plus twice the mean drop to its neighbours.
     reach: f64,
+    /// Second derivative per sample from the last three values; NaN if there is none.
+    curvature: f64,
 }
 
 struct Orbit<'a> {
@@ -191,6 +197,9 @@ impl Orbit<'_> {
             }
             let bend = a - 2.0 * b + c;
             let between = b >= a && b >= c;
+            // At a corner, where a derivative jumps, it grows as the neighbours come closer, and the parabola overshoots.
+            let before = std::mem::replace(&mut peak.curvature, bend / (peak.spacing * peak.spacing));
+            let round = (peak.curvature - before).abs() <= ROUND * before.abs();
             peak.reach = f64::INFINITY;
             if bend < 0.0 {
                 let shift = 0.5 * (a - c) / bend;
@@ -198,7 +207,7 @@ impl Orbit<'_> {
                     peak.reach = b - 0.125 * (c - a) * (c - a) / bend - bend;
                 }
                 peak.place += peak.spacing * shift.clamp(-1.0, 1.0);
-                if between && peak.spacing < 0.1 && inside(peak.place) {
+                if between && round && peak.spacing < 0.1 && inside(peak.place) {
                     *best = best.max(b - 0.125 * (c - a) * (c - a) / bend);
                 }
             } else if a > b || c > b {

@@ -395,6 +395,13 @@ impl ZeroProblem for Held<'_> {
         [&u[..e], &self.surface.carry(&u[e..], from, to)].concat()
     }
 
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        let e = self.extra();
+        let extra = (0..e).map(|k| weights.iter().zip(solutions).map(|(weight, own)| weight * own[k]).sum());
+        let own: Vec<&[f64]> = solutions.iter().map(|own| &own[e..]).collect();
+        extra.chain(self.surface.blended(&own, weights)).collect()
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         self.surface.better_mesh(&u[self.extra()..], tolerance)
     }

@@ -4,7 +4,9 @@
 //! 1):
 //!
 //!   (1)  ∏ z / τ = 0, the determinant of F_u bordered by the tangent, up to a nonzero factor
-//!   (2)  F_u φ = 0, φ ⊥ tangent:  direction in the plane spanned by the tangents of both branches
+//!   (2)  p(1) / (τ |p|) = 0, the same with the characteristic polynomial p and the norm of its coefficients, which is
+//!        smooth also where multipliers meet
+//!   (3)  F_u φ = 0, φ ⊥ tangent:  direction in the plane spanned by the tangents of both branches
 
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::{FLAT, Kind, Point, Solution};
@@ -50,6 +52,25 @@ impl Monitor for BranchPoint {
             self.spectrum_without_symmetry(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
         // A single eigenvalue cannot be compared with others.
         (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > FLAT
+    }
+
+    fn smooth(&self, at: &Point) -> Option<f64> {
+        if !matches!(at.solution, Solution::Cycle(_)) {
+            return None;
+        }
+        // Coefficients of the characteristic polynomial, the highest power first.
+        let mut polynomial = vec![Complex64::new(1.0, 0.0)];
+        for z in self.spectrum_without_symmetry(at) {
+            polynomial.push(Complex64::default());
+            for k in (1..polynomial.len()).rev() {
+                let before = polynomial[k - 1];
+                polynomial[k] -= z * before;
+            }
+        }
+        let size = polynomial.iter().map(|c| c.re * c.re).sum::<f64>().sqrt();
+        let slope = at.parameter_slope();
+        let value = polynomial.iter().map(|c| c.re).sum::<f64>() / size;
+        Some(value / slope.abs().max(f64::MIN_POSITIVE).copysign(slope)).filter(|value| value.is_finite())
     }
 
     fn jump(&self) -> usize {

@@ -6,11 +6,17 @@
 //! changes by one there, or by two where a symmetry repeats the event within the period; the extremum next to zero says
 //! how far it is to the event.
 //!
+//! Between two points of a branch the extrema are paired in the order of time, so that several events of one switch
+//! within a step are separate zeros of separate functions. Pairs of a maximum and a minimum that exist at one of the
+//! two points only, on one side of zero, have no partners. The derivatives of an extremum at both points show whether it
+//! may pass zero and return in between.
+//!
 //! **Equations.** With extrema e_i of h over the period, N the number of excursions h > 0:
 //!
 //! ```text
-//!   (1)  (-1)^N min |e_i| = 0,    (-1)^⌊N/2⌋ min |e_i| = 0        cycles
-//!   (2)  h(x) = 0                                                equilibria
+//!   (1)  e_i = 0                         cycles, between two points
+//!   (2)  (-1)^N min |e_i|                cycles, value at a point
+//!   (3)  h(x) = 0                        equilibria
 //! ```
 //!
 //! **Source.** dibernardo2008, §2.5 and §7.
@@ -18,8 +24,10 @@
 //! Where the orbit slides along the surface, h is zero; see [`super::sliding::touches`] for what takes the place of the
 //! extremum.
 
+mod pairs;
+
 use super::sliding;
-use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
+use crate::contract::{Batch, Events, Monitor, Parameters, Separate, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
 use crate::problem::gauss::Scheme;
 
@@ -32,13 +40,24 @@ const ROUNDS: usize = 5;
 /// part of the orbit.
 const ZERO: f64 = 1e-11;
 
+/// Index and size of the unknown λ of each free parameter.
+pub type Axes = [(usize, f64)];
+
 /// Monitor of grazings of one switch.
+#[derive(Clone)]
 pub struct Grazing<'a> {
     field: &'a dyn VectorField,
     switch: usize,
     cycles: bool,
-    /// 1 or 2, for the two functions (1).
-    stride: usize,
+    axes: Vec<(usize, f64)>,
+}
+
+/// Monitor of a single extremum, one of those at the left point.
+struct Touch<'a> {
+    of: Grazing<'a>,
+    /// The extrema at the left and at the right point.
+    ends: [Vec<Extremum>; 2],
+    index: usize,
 }
 
 /// A local extremum of a switch along a cycle.
@@ -52,11 +71,14 @@ pub struct Extremum {
     pub maximum: bool,
 }
 
-/// Monitors of all switches of a field, for equilibria or for cycles.
-pub fn monitors(field: &dyn VectorField, cycles: bool) -> Vec<Box<dyn Monitor + '_>> {
-    let strides: &[usize] = if cycles { &[1, 2] } else { &[1] };
-    let each = (0..field.switch_count()).flat_map(|switch| strides.iter().map(move |stride| (switch, *stride)));
-    each.map(|(switch, stride)| Box::new(Grazing { field, switch, cycles, stride }) as Box<dyn Monitor + '_>).collect()
+/// The extrema at two points, and the pairs of their indices.
+type Matched = ([Vec<Extremum>; 2], Vec<[usize; 2]>);
+
+/// Monitors of all switches of a field, for equilibria or for cycles; `axes` are the free parameters in the order of the
+/// unknowns.
+pub fn monitors<'a>(field: &'a dyn VectorField, cycles: bool, axes: &Axes) -> Vec<Box<dyn Monitor + 'a>> {
+    let each = (0..field.switch_count()).map(|switch| Grazing { field, switch, cycles, axes: axes.to_vec() });
+    each.map(|own| Box::new(own) as Box<dyn Monitor + 'a>).collect()
 }
 
 impl Monitor for Grazing<'_> {
@@ -78,7 +100,34 @@ impl Monitor for Grazing<'_> {
         if least.is_infinite() {
             return size;
         }
-        if (excursions(&extrema) / self.stride as i64).rem_euclid(2) == 0 { least } else { -least }
+        if excursions(&extrema).rem_euclid(2) == 0 { least } else { -least }
+    }
+
+    fn separately<'m>(&'m self, left: &Point, right: &Point, length: f64) -> Option<Events<'m>> {
+        if !self.cycles {
+            return None;
+        }
+        let Some((ends, matched)) = self.matched(left, right) else {
+            // The number of excursions alone, with a look in between.
+            let values = [left, right].map(|at| self.value(left, at));
+            let own = || Separate { values, monitor: Box::new(self.clone()) };
+            let seen = ((values[0] > 0.0) != (values[1] > 0.0) && values.iter().all(|v| v.is_finite())).then(own);
+            return Some(Events { seen: seen.into_iter().collect(), turns: vec![0.5] });
+        };
+        let passes = |pair: &&[usize; 2]| (ends[0][pair[0]].value > 0.0) != (ends[1][pair[1]].value > 0.0);
+        let single = |pair: &[usize; 2]| Separate {
+            values: [ends[0][pair[0]].value, ends[1][pair[1]].value],
+            monitor: Box::new(Touch { of: self.clone(), ends: ends.clone(), index: pair[0] }),
+        };
+        let slope = |at: &Point, own: &Extremum| length * self.slope(at, own).unwrap_or(0.0);
+        let between = |pair: &[usize; 2]| {
+            let [a, b] = [&ends[0][pair[0]], &ends[1][pair[1]]];
+            pairs::closest(a.value, b.value, || [slope(left, a), slope(right, b)])
+        };
+        Some(Events {
+            seen: matched.iter().filter(passes).map(single).collect(),
+            turns: matched.iter().filter_map(between).collect(),
+        })
     }
 
     fn confirms(&self, _at: &Point) -> bool {
@@ -95,6 +144,117 @@ impl Monitor for Grazing<'_> {
 
     fn label(&self) -> usize {
         self.switch + 1
+    }
+}
+
+impl Grazing<'_> {
+    /// The extrema at two points, and the pairs of their indices; `None` if they cannot be paired.
+    fn matched(&self, left: &Point, right: &Point) -> Option<Matched> {
+        let of = |at: &Point| match &at.solution {
+            Solution::Cycle(cycle) => Some(extrema(self.field, &at.parameters, cycle, self.switch)),
+            Solution::Equilibrium(_) => None,
+        };
+        let [(a, size), (b, other)] = [of(left)?, of(right)?];
+        let flat = |all: &[Extremum], size: f64| all.iter().filter(|e| e.value.abs() < ZERO * size).count() > 2;
+        if flat(&a, size) || flat(&b, other) {
+            return None;
+        }
+        let matched = pairs::matched(&a, &b, size.max(other))?;
+        Some(([a, b], matched))
+    }
+
+    /// Change of an extremum per unit of length along the branch.
+    fn slope(&self, at: &Point, own: &Extremum) -> Option<f64> {
+        let Solution::Cycle(cycle) = &at.solution else { return None };
+        let (size, k) = (cycle.profile.len(), self.axes.len());
+        // A condition has unknowns before these.
+        let extra = at.tangent.len().checked_sub(size + 1 + k)?;
+        let along = Cycle { profile: at.tangent[extra..extra + size].to_vec(), gain: Vec::new(), ..cycle.clone() };
+        let (x, v) = (cycle.state(own.time), along.state(own.time));
+        let moves = &at.tangent[at.tangent.len() - k..];
+        let forced = f64::from(cycle.forcing_periods);
+        let time = (forced > 0.0).then_some(forced * own.time);
+        let largest = |of: &[f64]| of.iter().fold(f64::MIN_POSITIVE, |most: f64, v| most.max(v.abs()));
+        let step = 1e-6 * largest(&x).max(f64::MIN_POSITIVE) / largest(&v).max(largest(moves));
+        let moved = |by: f64| {
+            let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + by * v).collect();
+            let mut parameters = at.parameters.clone();
+            self.axes.iter().zip(moves).for_each(|((index, unit), t)| parameters[*index] += by * unit * t);
+            value(self.field, &parameters, &y, time.as_slice(), self.switch)[0]
+        };
+        Some((moved(step) - moved(-step)) / (2.0 * step))
+    }
+}
+
+impl Monitor for Touch<'_> {
+    fn kind(&self) -> Kind {
+        Kind::Grazing
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        self.here(at).map_or(f64::NAN, |(all, _, own)| all[own].value)
+    }
+
+    fn confirms(&self, _at: &Point) -> bool {
+        true
+    }
+
+    fn reads(&self) -> Sight {
+        Sight::Everything
+    }
+
+    fn jump(&self) -> usize {
+        0
+    }
+
+    fn label(&self) -> usize {
+        self.of.switch + 1
+    }
+
+    fn remark(&self, at: &Point, forwards: bool) -> String {
+        /// Ratio of the values of extrema that pass zero together, and what is zero, relative to the largest value.
+        const TOGETHER: [f64; 2] = [10.0, 1e-8];
+        let Some((all, here, own)) = self.here(at) else { return String::new() };
+        let Some(across) = self.across() else { return String::new() };
+        let size = self.size();
+        let zero = (TOGETHER[0] * all[own].value.abs()).max(TOGETHER[1] * size);
+        let on_side = |side: usize| -> i64 {
+            let mut there = all.clone();
+            for [left, here] in &here {
+                let Some([_, right]) = across.iter().find(|pair| pair[0] == *left) else { continue };
+                let end = [&self.ends[0][*left], &self.ends[1][*right]][side];
+                if there[*here].value.abs() <= zero {
+                    there[*here].value = end.value;
+                }
+            }
+            excursions(&there)
+        };
+        let [mut before, mut after] = [on_side(0), on_side(1)];
+        if !forwards {
+            std::mem::swap(&mut before, &mut after);
+        }
+        format!("contacts {before} → {after} at {} = 0", self.of.field.switch_name(self.of.switch))
+    }
+}
+
+impl Touch<'_> {
+    /// Largest value at both ends.
+    fn size(&self) -> f64 {
+        self.ends.iter().flatten().fold(0.0, |most: f64, e| most.max(e.value.abs()))
+    }
+
+    /// Pairs of the extrema at both ends.
+    fn across(&self) -> Option<Vec<[usize; 2]>> {
+        pairs::matched(&self.ends[0], &self.ends[1], self.size())
+    }
+
+    /// The extrema at a point between both ends, their pairs with those at the left, and the index of this one.
+    fn here(&self, at: &Point) -> Option<(Vec<Extremum>, Vec<[usize; 2]>, usize)> {
+        let Solution::Cycle(cycle) = &at.solution else { return None };
+        let (all, size) = extrema(self.of.field, &at.parameters, cycle, self.of.switch);
+        let here = pairs::matched(&self.ends[0], &all, size)?;
+        let own = here.iter().find(|pair| pair[0] == self.index)?[1];
+        Some((all, here, own))
     }
 }
 
@@ -157,7 +317,8 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
         let (time, value) = refined([back, places[k], on], [values[before], values[k], values[after]], &at);
         found.push(Extremum { time, value, maximum });
     }
-    (found, size)
+    found.sort_by(|a, b| a.time.total_cmp(&b.time));
+    (pairs::alternating(found, ZERO * size), size)
 }
 
 /// Marks the places of a slide along the surface, which has no extrema: runs of small values at which f on both sides
@@ -189,7 +350,12 @@ fn refined(mut t: [f64; 3], mut v: [f64; 3], at: &dyn Fn(f64) -> f64) -> (f64, f
         if !(place > bounds[0] && place < bounds[1]) {
             break;
         }
-        found = (place, at(place));
+        let there = (place, at(place));
+        // At a corner, where f jumps, the parabola is no guide: the extremum is the sample itself.
+        if (there.1 - found.1) * bend > 0.0 && (there.1 - found.1).abs() > f64::EPSILON * found.1.abs() {
+            break;
+        }
+        found = there;
         let step = (0.0625 * (t[2] - t[0])).min(place - bounds[0]).min(bounds[1] - place);
         if step < 1e-9 {
             break;

@@ -41,6 +41,7 @@ pub mod on_maps;
 pub mod on_surfaces;
 pub mod peak;
 pub mod period_doubling;
+pub mod phases;
 pub mod quantity;
 pub mod sliding;
 pub mod torus;

@@ -296,6 +296,10 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.carry(u, from, to)
     }
 
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        self.cycles.blended(solutions, weights)
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         self.cycles.better_mesh(u, tolerance)
     }

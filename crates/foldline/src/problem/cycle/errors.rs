@@ -271,20 +271,21 @@ impl CycleProblem<'_> {
         };
         let Defect { mut local, mut within, mut ends, mut sources, mut misses } =
             measure(self.setting.field, &u[..size], &self.mesh);
-        // An interval in which the orbit switches has the defects of its parts.
+        // An interval in which the orbit switches has the defects of its parts, but where a part is divided, the error
+        // of the whole: the divisions are no part of the mesh, and without them the interval may be too long.
         let (n, inner, count) = (self.n, self.scheme.degree * self.n, self.intervals());
         for found in self.switched(u).iter() {
             let j = found.interval;
             within.iter_mut().skip(j).step_by(count).for_each(|w| *w = 0.0);
             sources[j * inner..(j + 1) * inner].fill(0.0);
-            local[j] = 0.0;
-            let mut missed = vec![0.0; n];
+            let (mut errors, mut missed) = (Vec::with_capacity(found.parts.len()), vec![0.0; n]);
             for part in &found.parts {
                 let field = OneBranch { field: self.setting.field, signs: &part.signs };
                 let own = measure(&field, &part.nodes, &part.ends);
-                local[j] = own.local.iter().fold(local[j], |most: f64, e| most.max(*e));
+                errors.push(own.local[0]);
                 missed.iter_mut().zip(&own.misses).for_each(|(all, own)| *all += own);
             }
+            local[j] = found.undivided(&errors, self.scheme.degree);
             ends[j * n..(j + 1) * n].copy_from_slice(&missed);
             misses[j * n..(j + 1) * n].copy_from_slice(&missed);
         }

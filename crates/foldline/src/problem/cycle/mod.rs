@@ -47,7 +47,7 @@ use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{all_finite, larger, same};
+use crate::linalg::{all_finite, axpy, larger, same};
 use crate::stability::floquet::{self, Course, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
@@ -207,6 +207,47 @@ impl<'a> CycleProblem<'a> {
         for found in self.switched(u).iter() {
             let own = found.interval * block + self.n..(found.interval + 1) * block;
             u[own].copy_from_slice(&found.inner(&self.scheme, self.interval(found.interval)));
+        }
+    }
+
+    /// Replaces the interpolated `u` by the flow on intervals in which any of the solutions switches, each run of them
+    /// from the right end of the interval before it. A switching moves with the solution, so that the values there are
+    /// not smooth functions along the curve.
+    fn continue_through(&self, solutions: &[&[f64]], u: &mut [f64]) {
+        let (n, size, block, count) = (self.n, self.profile_size(), self.block(), self.intervals());
+        let mut crossed = vec![false; count];
+        for own in solutions {
+            let found = self.flow(own).intervals(&own[..size], &self.mesh).unwrap_or_default();
+            found.iter().for_each(|found| crossed[found.interval] = true);
+        }
+        let Some(first) = crossed.iter().position(|own| !own) else { return };
+        let flow = self.flow(u);
+        let mut left: Option<Vec<f64>> = None;
+        for j in (first + 1..=first + count).map(|j| j % count) {
+            if j == 0 {
+                left.iter_mut().for_each(|x| x.iter_mut().zip(&self.gain).for_each(|(x, gain)| *x -= gain));
+            }
+            if !crossed[j] {
+                left = None;
+                continue;
+            }
+            let before = (j + count - 1) % count;
+            let x = left.take().unwrap_or_else(|| {
+                let mut x = vec![0.0; n];
+                self.scheme.value_into(1.0, &u[before * block..(before + 1) * block], &mut x);
+                if j == 0 {
+                    x.iter_mut().zip(&self.gain).for_each(|(x, gain)| *x -= gain);
+                }
+                x
+            });
+            let own = j * block..(j + 1) * block;
+            let Some((inner, end)) = flow.through(j, &x, self.interval(j), &u[own.clone()], [&u[..size], &self.mesh])
+            else {
+                return;
+            };
+            u[own.start..own.start + n].copy_from_slice(&x);
+            u[own.start + n..own.end].copy_from_slice(&inner);
+            left = Some(end);
         }
     }
 
@@ -552,6 +593,13 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         out.extend_from_slice(&u[size..]);
         out
+    }
+
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        let mut u = vec![0.0; self.unknowns()];
+        weights.iter().zip(solutions).for_each(|(weight, own)| axpy(*weight, own, &mut u));
+        self.continue_through(solutions, &mut u);
+        u
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {

@@ -21,7 +21,12 @@
 //! side, gives the same derivatives in the limit, so that it need not be known whether an interval begins on it.
 //!
 //! If f is continuous at the surface, (4) leaves V unchanged, because to first order the crossing times do not matter.
-//! The flow is then continuously differentiable, also where the orbit grazes the surface.
+//! The flow is then continuously differentiable, also where the orbit grazes the surface. So that this holds for its
+//! discretisation as well, an interval is also cut where the orbit comes close to a surface and turns away from it: the
+//! cut is the limit of a contact of vanishing length.
+//!
+//! A part on which f changes much faster than elsewhere, such as a short contact with a stiff stop in a long interval, is
+//! divided into parts of the length that one polynomial represents.
 //!
 //! **Source.** leine2004 (saltation matrix); filippov1988, §4 (sliding). The extremum test: shampine2000.
 //!
@@ -55,9 +60,14 @@ const CLOSE: f64 = 0.01;
 const ZERO: f64 = 1e-13;
 /// Length of a part, relative to its interval, below which it is left out: what f changes on it is then rounding.
 const SHORTEST: f64 = 1e-12;
-/// Jump of f, relative to the larger side, below which f is continuous: a switching is located to rounding, so that f
-/// on both sides of a kink differs by rounding times the ratio of the stiffnesses, up to 1e6.
+/// Jump of f, relative to the larger side and besides rounding, below which f is continuous.
 const CONTINUOUS: f64 = 1e-9;
+/// Longest part, in units of the time in which f changes: one polynomial of degree 4 has an error of 1e-6 on it. A stop
+/// that is stiffer than what the mesh was made for begins within a long interval.
+const REACH: f64 = 1.5;
+/// Shortest part of a division, relative to its interval: a stop against which the orbit rests for long need not be
+/// resolved further.
+const FINEST: f64 = 1e-3;
 /// Function of the nodes of a part, its ends, and a place in it.
 type OnPart<'a> = dyn Fn(&[f64], [f64; 2], f64) -> f64 + 'a;
 
@@ -81,6 +91,15 @@ impl Obstacle {
             Obstacle::Lost => "the motion between two switchings could not be computed",
         }
     }
+}
+
+/// A solved part: its nodes `[m + 1][n]`, f_x at the Gauss points `[n·n × m]` and the matrix of the last Newton step.
+struct Solved {
+    nodes: Vec<f64>,
+    fx: Vec<f64>,
+    /// L and U of 1 - ℓ a f_x, and the pivots.
+    matrix: Vec<f64>,
+    pivots: Vec<usize>,
 }
 
 /// The flow of a vector field along a piecewise smooth orbit.
@@ -138,11 +157,26 @@ impl<'a> PiecewiseFlow<'a> {
         for j in suspects {
             let nodes = &profile[j * block..(j + 1) * block];
             let found = self.along(j, &nodes[..self.n()], [mesh[j], mesh[j + 1]], nodes, &sizes)?;
-            if found.parts.len() > 1 || !found.at_start.is_empty() {
+            if found.switches() {
                 all.push(found);
             }
         }
         Ok(all)
+    }
+
+    /// Values that the flow from `x` over an interval requires at the inner nodes, `[m][n]`, and its right end. `nodes` is a
+    /// polynomial close to it, and `orbit` the profile and the mesh to which the interval belongs.
+    pub fn through(
+        &self,
+        interval: usize,
+        x: &[f64],
+        ends: [f64; 2],
+        nodes: &[f64],
+        [profile, mesh]: [&[f64]; 2],
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
+        let (_, sizes) = self.suspects(profile, mesh);
+        let found = self.along(interval, x, ends, nodes, &sizes).ok()?;
+        Some((found.inner(self.scheme, ends), found.end))
     }
 
     /// The intervals in which a switch could vanish, and the largest value of every switch: it changes by as much as its
@@ -196,6 +230,7 @@ impl<'a> PiecewiseFlow<'a> {
             interval,
             parts: Vec::new(),
             jumps: false,
+            nears: false,
             sizes: sizes.to_vec(),
             at_start: Vec::new(),
             trace: 0.0,
@@ -203,33 +238,47 @@ impl<'a> PiecewiseFlow<'a> {
             end_by: identity(n, width),
         };
         let (mut begin, mut passed, mut count, mut halvings) = (ends[0], Vec::new(), 0, 0);
-        let length = ends[1] - ends[0];
+        let (length, mut touched) = (ends[1] - ends[0], None);
         loop {
             let within = |t: f64| (t - ends[0]) / length;
             // A branch of f need not be defined far beyond its surface.
-            let shorter = (halvings..=HALVINGS).map(|k| match k {
-                0 => ends[1],
-                _ => begin + (ends[1] - begin) * 0.5f64.powi(k),
-            });
-            let trials = shorter.map(|last| {
+            let trials = (halvings..=HALVINGS).map(|k| {
+                let last = if k == 0 { ends[1] } else { begin + (ends[1] - begin) * 0.5f64.powi(k) };
                 let from = self.restricted(guess, [within(begin), within(last)]);
-                Some((last, self.solved(&found.end, [begin, last], &signs, from)?))
+                self.resolved(&found.end, [begin, last], length, &signs, from)
             });
-            let (last, nodes) = trials.flatten().next().ok_or(Obstacle::Lost)?;
-            let trial = Trial { nodes: &nodes, ends: [begin, last], signs: &signs, passed: &passed };
-            count += 1;
+            let (last, part) = trials.flatten().next().ok_or(Obstacle::Lost)?;
+            let trial = Trial {
+                nodes: &part.nodes,
+                ends: [begin, last],
+                signs: &signs,
+                passed: &passed,
+                touched,
+                whole: length,
+            };
             let (at, switch, side) = match self.first(&trial, sizes) {
                 Met::Nothing => {
-                    self.close(&mut found, [begin, last], nodes, &signs).ok_or(Obstacle::Lost)?;
+                    self.close(&mut found, [begin, last], part, &signs).ok_or(Obstacle::Lost)?;
                     if last == ends[1] {
                         return Ok(found);
                     }
-                    (begin, halvings) = (last, 0);
+                    (begin, halvings, touched) = (last, 0, None);
+                    passed.clear();
+                    continue;
+                }
+                Met::Near(at, switch) => {
+                    let end = begin + at * (last - begin);
+                    let from = self.restricted(&part.nodes, [0.0, at]);
+                    let part = self.solved(&found.end, [begin, end], &signs, from).ok_or(Obstacle::Lost)?;
+                    self.close(&mut found, [begin, end], part, &signs).ok_or(Obstacle::Lost)?;
+                    (begin, halvings, touched) = (end, 0, Some(switch));
+                    found.nears = true;
                     passed.clear();
                     continue;
                 }
                 // A tangency to rounding where f is continuous; where f jumps the orbit slides.
                 Met::Back(switch) if count <= MOST && self.is_continuous(&found.end, begin, &signs, switch) => {
+                    count += 1;
                     signs[switch] = -signs[switch];
                     continue;
                 }
@@ -237,6 +286,7 @@ impl<'a> PiecewiseFlow<'a> {
                 Met::At(at, switch) => (at, switch, 0.0),
                 Met::Leaves(at, switch, side) => (at, switch, side),
             };
+            count += 1;
             if count > MOST {
                 return Err(Obstacle::Chatters);
             }
@@ -244,18 +294,18 @@ impl<'a> PiecewiseFlow<'a> {
                 0.0 => self.switch(nodes, ends, s, switch),
                 _ => self.push(nodes, ends, s, &signs, switch, side),
             };
-            let part = self.until(&found.end, [begin, last], at, &signs, &nodes, &value).ok_or(Obstacle::Lost)?;
-            let (end, nodes) = part;
+            let part = self.until(&found.end, [begin, last], at, &signs, &part.nodes, &value).ok_or(Obstacle::Lost)?;
+            let (end, part) = part;
             // A trial that is far off the part does not show where it ends.
-            let size = if side == 0.0 { sizes[switch] } else { value(&nodes, [begin, end], 0.0).abs() };
-            if halvings < HALVINGS && value(&nodes, [begin, end], 1.0).abs() > NEARLY * size {
+            let size = if side == 0.0 { sizes[switch] } else { value(&part.nodes, [begin, end], 0.0).abs() };
+            if halvings < HALVINGS && value(&part.nodes, [begin, end], 1.0).abs() > NEARLY * size {
                 halvings += 1;
                 continue;
             }
             halvings = 0;
             let passes = end - begin > SHORTEST * length;
             if passes {
-                self.close(&mut found, [begin, end], nodes, &signs).ok_or(Obstacle::Lost)?;
+                self.close(&mut found, [begin, end], part, &signs).ok_or(Obstacle::Lost)?;
             }
             if found.parts.is_empty() {
                 found.at_start.push((signs.clone(), switch));
@@ -265,6 +315,7 @@ impl<'a> PiecewiseFlow<'a> {
                 // f is continuous where a slide ends.
                 _ => side,
             };
+            touched = None;
             // A shorter part is left out, and the next one begins in its place.
             if passes {
                 begin = end;
@@ -308,12 +359,12 @@ impl<'a> PiecewiseFlow<'a> {
         signs: &[f64],
         trial: &[f64],
         value: &OnPart,
-    ) -> Option<(f64, Vec<f64>)> {
+    ) -> Option<(f64, Solved)> {
         let mut end = begin + at * (last - begin);
-        let mut nodes = self.solved(x, [begin, end], signs, self.restricted(trial, [0.0, at]))?;
+        let mut part = self.solved(x, [begin, end], signs, self.restricted(trial, [0.0, at]))?;
         // From the root of the trial to that of the part, which is more accurate at its end.
         for _ in 0..4 {
-            let [last_but_one, own] = [1.0 - 1e-4, 1.0].map(|s| value(&nodes, [begin, end], s));
+            let [last_but_one, own] = [1.0 - 1e-4, 1.0].map(|s| value(&part.nodes, [begin, end], s));
             let off = own / (own - last_but_one) * 1e-4;
             let moved = (end - off * (end - begin)).min(last);
             // At a grazing the crossing time is poorly determined, and matters little.
@@ -321,11 +372,73 @@ impl<'a> PiecewiseFlow<'a> {
                 break;
             }
             let share = (moved - begin) / (end - begin);
-            let from = self.restricted(&nodes, [0.0, share]);
+            let from = self.restricted(&part.nodes, [0.0, share]);
+            let settled = (moved - end).abs() < 1e-11 * (end - begin);
             end = moved;
-            nodes = self.solved(x, [begin, end], signs, from)?;
+            part = self.solved(x, [begin, end], signs, from)?;
+            // The slope of the secant is right to four digits.
+            if settled {
+                break;
+            }
         }
-        Some((end, nodes))
+        Some((end, part))
+    }
+
+    /// The part from `begin` to `end`, or to where one polynomial no longer represents it: its end and the part. `inner`
+    /// are Gauss points of the whole to begin with, `whole` is the length of the interval. The length is a continuous
+    /// function of the state, so that the flow is one too.
+    fn resolved(
+        &self,
+        x: &[f64],
+        [begin, end]: [f64; 2],
+        whole: f64,
+        signs: &[f64],
+        mut inner: Vec<f64>,
+    ) -> Option<(f64, Solved)> {
+        /// Reach within a part, relative to that at its left end, below which the part is too long: f may become stiff
+        /// on the way.
+        const LESS: f64 = 0.5;
+        let mut last = end;
+        let shorten = |last: &mut f64, inner: &mut Vec<f64>, reach: f64| {
+            let next = begin + reach.max(FINEST * whole);
+            if next < *last - SHORTEST * whole {
+                let nodes = [x, &inner[..]].concat();
+                *inner = self.restricted(&nodes, [0.0, (next - begin) / (*last - begin)]);
+                *last = next;
+            }
+        };
+        shorten(&mut last, &mut inner, self.reach_at(x, begin, signs));
+        loop {
+            let whole_part = last;
+            let part = self.solved(x, [begin, last], signs, inner)?;
+            let reach = self.reach_of(&part.fx, self.scheme.degree);
+            if reach >= LESS * (last - begin) || last - begin <= FINEST * whole {
+                return Some((last, part));
+            }
+            inner = part.nodes[self.n()..].to_vec();
+            shorten(&mut last, &mut inner, reach);
+            if last == whole_part {
+                return Some((last, part));
+            }
+        }
+    }
+
+    /// Longest part, in normalised time, with these f_x `[n·n × lanes]`.
+    fn reach_of(&self, fx: &[f64], lanes: usize) -> f64 {
+        let n = self.n();
+        let pairs = (0..n * n).flat_map(|k| (0..lanes).map(move |lane| (k, lane)));
+        // In any units: diagonal entries, and products of entries across the diagonal.
+        let squares = pairs.map(|(k, lane)| (fx[k * lanes + lane] * fx[(k % n * n + k / n) * lanes + lane]).abs());
+        let reach = REACH / (squares.fold(0.0, f64::max).sqrt() * self.scalars[0]);
+        if reach.is_nan() { f64::INFINITY } else { reach }
+    }
+
+    fn reach_at(&self, x: &[f64], t: f64, signs: &[f64]) -> f64 {
+        let (n, time, parameters) = (self.n(), self.time(t), Parameters::Shared(&self.parameters));
+        let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size]);
+        let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs };
+        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+        self.reach_of(&fx, 1)
     }
 
     /// A polynomial at the Gauss points of the part between two places of it, `[m][n]`.
@@ -377,24 +490,27 @@ impl<'a> PiecewiseFlow<'a> {
         matrix
     }
 
-    /// (1): the nodes `[m + 1][n]` of a part from `x`, by Newton's method from its Gauss points `[m][n]`.
-    fn solved(&self, x: &[f64], ends: [f64; 2], signs: &[f64], mut inner: Vec<f64>) -> Option<Vec<f64>> {
-        /// Updates, relative, that rounding may leave, and what is accepted where it leaves more.
-        const ROUNDED: [f64; 2] = [1e-14, 1e-9];
-        const ROUNDS: usize = 12;
+    /// (1): a part from `x`, by Newton's method from its Gauss points `[m][n]`. The matrix is kept while it gains more
+    /// than a digit per step.
+    fn solved(&self, x: &[f64], ends: [f64; 2], signs: &[f64], mut inner: Vec<f64>) -> Option<Solved> {
+        /// Error, relative, that counts as none, and update that is accepted where rounding stops the convergence.
+        const ROUNDED: [f64; 2] = [1e-15, 1e-9];
+        const ROUNDS: usize = 16;
         let (n, m, field) = (self.n(), self.scheme.degree, self.setting.field);
         let (length, times) = self.course(ends);
         let signs: Vec<f64> = signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
         let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size * m]);
-        let mut pivots = vec![0; n * m];
+        let (mut matrix, mut pivots) = (Vec::new(), vec![0; n * m]);
         let scale = |c: usize| self.setting.scales[c].max(x[c].abs());
-        let mut before = f64::INFINITY;
-        for _ in 0..ROUNDS {
+        let (mut before, mut fresh) = (f64::INFINITY, true);
+        for round in 0..ROUNDS {
             let states = self.lanes(&inner);
             let parameters = Parameters::Shared(&self.parameters);
             let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
-            field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-            let mut matrix = self.matrix(length, &fx);
+            match fresh {
+                true => field.linearise(batch, &[], &mut f, &mut fx, &mut []),
+                false => field.evaluate(batch, &mut f),
+            }
             let mut change = vec![0.0; n * m];
             for (i, row) in change.chunks_exact_mut(n).enumerate() {
                 for c in 0..n {
@@ -403,25 +519,38 @@ impl<'a> PiecewiseFlow<'a> {
                     row[c] = inner[i * n + c] - x[c] - length * rise;
                 }
             }
-            lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+            if fresh {
+                matrix = self.matrix(length, &fx);
+                lu::factorise_scaled(&mut matrix, n * m, &mut pivots, self.setting.scales).ok()?;
+            }
             lu::solve(&matrix, n * m, &pivots, &mut change, 1);
             inner.iter_mut().zip(&change).for_each(|(x, d)| *x -= d);
             let off = change.iter().enumerate().map(|(k, d)| (d / scale(k % n)).abs()).fold(0.0, f64::max);
             if !off.is_finite() {
                 return None;
             }
-            if off < ROUNDED[0] || off < ROUNDED[1] && off > 0.3 * before {
-                return Some([x, &inner].concat());
+            // What is left: quadratic convergence with a new matrix, linear with an old one.
+            let ratio = off / before;
+            let left = if fresh { off * off } else { off * ratio };
+            let stalls = off < ROUNDED[1] && ratio > 0.3;
+            if off < 10.0 * ROUNDED[0] || left < ROUNDED[0] && (round > 0 || off < 1e-8) || stalls {
+                let nodes = [x, &inner].concat();
+                return Some(Solved { nodes, fx, matrix, pivots });
             }
+            fresh = round > 0 && ratio > 0.1;
             before = off;
         }
-        (before < ROUNDED[1]).then(|| [x, &inner].concat())
+        if before >= ROUNDED[1] {
+            return None;
+        }
+        Some(Solved { nodes: [x, &inner].concat(), fx, matrix, pivots })
     }
 
     /// Appends a part with its derivatives (3), and moves the end there.
-    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, own_signs: &[f64]) -> Option<()> {
+    fn close(&self, found: &mut Switched, ends: [f64; 2], part: Solved, own_signs: &[f64]) -> Option<()> {
         let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
         let (length, times) = self.course(ends);
+        let Solved { nodes, fx: known, mut matrix, mut pivots, .. } = part;
         let states = self.lanes(&nodes[n..]);
         let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size * m]);
         let signs: Vec<f64> = own_signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
@@ -441,9 +570,11 @@ impl<'a> PiecewiseFlow<'a> {
                 }
             }
         }
-        let mut matrix = self.matrix(length, &fx);
-        let mut pivots = vec![0; n * m];
-        lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+        // Where f is linear, the matrix of the last Newton step is that of the solution.
+        if fx != known {
+            matrix = self.matrix(length, &fx);
+            lu::factorise_scaled(&mut matrix, n * m, &mut pivots, self.setting.scales).ok()?;
+        }
         lu::solve(&matrix, n * m, &pivots, &mut inner, width);
         let by = [&found.end_by[..], &inner].concat();
         found.end = self.at_end(&nodes, n);
@@ -455,30 +586,47 @@ impl<'a> PiecewiseFlow<'a> {
         found.end.iter().chain(&found.end_by).all(|x| x.is_finite()).then_some(())
     }
 
-    /// f on both sides of a switch that vanishes at `x`.
-    fn sides(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> [Vec<f64>; 2] {
-        let time = self.time(t);
+    /// f on both sides of a switch that vanishes at `x`, evaluated on the surface itself, and the part of each component
+    /// of their difference that is rounding of the state. A kink of a stiff spring would otherwise look like a jump.
+    fn sides(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> ([Vec<f64>; 2], Vec<f64>) {
+        let (n, time, scales) = (self.n(), self.time(t), self.setting.scales);
+        let parameters = Parameters::Shared(&self.parameters);
+        let at = |states: &'_ [f64]| -> [Vec<f64>; 4] {
+            let batch = Batch { lanes: 1, states, parameters, times: time.as_slice(), signs: &[] };
+            self.setting.linearise_switches(batch)
+        };
+        let [h, hx, _, _] = at(x);
+        let gradient = &hx[switch * n..(switch + 1) * n];
+        let square: f64 = gradient.iter().zip(scales).map(|(g, scale)| (g * scale).powi(2)).sum();
+        let onto = if square > 0.0 { h[switch] / square } else { 0.0 };
+        let x: Vec<f64> = (0..n).map(|c| x[c] - onto * gradient[c] * scales[c] * scales[c]).collect();
         let mut signs = signs.to_vec();
-        [(); 2].map(|()| {
-            let mut f = vec![0.0; self.n()];
-            let parameters = Parameters::Shared(&self.parameters);
-            let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &signs };
-            self.setting.field.evaluate(batch, &mut f);
+        let sides = [(); 2].map(|()| {
+            let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size]);
+            let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &signs };
+            self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
             signs[switch] = -signs[switch];
-            f
-        })
+            (f, fx)
+        });
+        let [(f, fx), (other, other_fx)] = sides;
+        let rounded = |c: usize| -> f64 {
+            let own = (0..n).map(|d| ((fx[c * n + d] - other_fx[c * n + d]) * scales[d].max(x[d].abs())).abs());
+            4.0 * f64::EPSILON * own.fold(0.0, f64::max)
+        };
+        let rounding = (0..n).map(rounded).collect();
+        ([f, other], rounding)
     }
 
     fn is_continuous(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> bool {
-        let [before, after] = self.sides(x, t, signs, switch);
-        self.same(&before, &after)
+        let ([before, after], rounding) = self.sides(x, t, signs, switch);
+        self.same(&before, &after, &rounding)
     }
 
-    fn same(&self, before: &[f64], after: &[f64]) -> bool {
+    fn same(&self, before: &[f64], after: &[f64], rounding: &[f64]) -> bool {
         let size = |of: &dyn Fn(usize) -> f64| {
             (0..self.n()).map(|c| (of(c) / self.setting.scales[c]).abs()).fold(0.0, f64::max)
         };
-        let jump = size(&|c| after[c] - before[c]);
+        let jump = size(&|c| ((after[c] - before[c]).abs() - rounding[c]).max(0.0));
         jump <= CONTINUOUS * size(&|c| before[c]).max(size(&|c| after[c]))
     }
 
@@ -486,8 +634,8 @@ impl<'a> PiecewiseFlow<'a> {
     /// switch from there on, 0 if the flow slides along its surface.
     fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Result<f64, Obstacle> {
         let x = found.end.clone();
-        let [before, mut after] = self.sides(&x, t, signs, switch);
-        let jumps = !self.same(&before, &after);
+        let ([before, mut after], rounding) = self.sides(&x, t, signs, switch);
+        let jumps = !self.same(&before, &after, &rounding);
         if let Some(last) = found.parts.last_mut().filter(|_| ends) {
             (last.switch, last.jumps) = (Some(switch), jumps);
         }

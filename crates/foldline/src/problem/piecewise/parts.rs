@@ -2,7 +2,7 @@
 
 use super::Scheme;
 use crate::diagram::Mesh;
-use crate::linalg::dot;
+use crate::linalg::{dot, larger};
 
 /// A part of an interval between switchings.
 #[derive(Clone, Debug)]
@@ -31,6 +31,8 @@ pub(crate) struct Switched {
     pub parts: Vec<Part>,
     /// True if f jumps at a switching.
     pub jumps: bool,
+    /// True if it is cut where the orbit comes close to a surface.
+    pub(super) nears: bool,
     /// Largest value of every switch along the orbit.
     pub(super) sizes: Vec<f64>,
     /// Switchings at the left end, which have no part: signs before each, and the switch.
@@ -46,6 +48,29 @@ impl Switched {
     /// ∫ tr f_x dt over the interval.
     pub fn trace(&self) -> f64 {
         self.trace + self.parts.iter().map(|part| part.trace).sum::<f64>()
+    }
+
+    /// True if the orbit switches in the interval or nearly does; parts may also be the pieces of one that is divided.
+    pub(super) fn switches(&self) -> bool {
+        self.nears || !self.at_start.is_empty() || self.parts.iter().any(|part| part.signs != self.parts[0].signs)
+    }
+
+    /// The largest error of the stretches between switchings, each as if it were not divided, from the errors of the
+    /// parts. Errors grow with the power m + 1 of the length.
+    pub fn undivided(&self, errors: &[f64], degree: usize) -> f64 {
+        let (mut most, mut first) = (0.0, 0);
+        for stretch in self.parts.chunk_by(|one, next| one.signs == next.signs) {
+            let own = &errors[first..first + stretch.len()];
+            first += stretch.len();
+            let length = |part: &Part| part.ends[1] - part.ends[0];
+            let longest = stretch.iter().map(length).fold(0.0, f64::max);
+            let whole: f64 = stretch.iter().map(length).sum();
+            // The shortest parts have errors of rounding.
+            let own = stretch.iter().zip(own).filter(|(part, _)| length(part) > 0.5 * longest);
+            let error = own.map(|(part, error)| error * (whole / length(part)).powi(degree as i32 + 1));
+            most = error.fold(most, larger);
+        }
+        most
     }
 
     /// Signs of the switches at the left end that give the flow there: those before its switchings, or, of an orbit that

@@ -10,9 +10,21 @@ const NEAR: f64 = 1e-11;
 /// Position in a part, from its left end, at which the flow shows on which side of the surface it continues. A shorter
 /// contact has a depth of the order of its square, which is rounding.
 const AFTER: f64 = 1e-6;
+/// Extremum of a switch, relative to its largest value, up to which a part is cut there.
+const CLOSE: f64 = 1e-3;
+
+/// Length of a part, relative to its interval, below which it is not cut off for that: its error is far below that of
+/// the interval. Where the extremum is one at which the part begins, distance to the next.
+const NARROW: f64 = 1e-3;
+const APART: f64 = 0.0625;
+/// Length of an interval, in periods, below which it is not cut for that.
+const SHORT: f64 = 1e-8;
+
 /// First switching on a trial polynomial.
 pub(super) enum Met {
     Nothing,
+    /// At this place, this switch comes close to zero and turns away.
+    Near(f64, usize),
     /// This switch, just passed, is passed back at once.
     Back(usize),
     /// At this place in (0, 1], this switch.
@@ -23,7 +35,7 @@ pub(super) enum Met {
 
 impl Met {
     fn is_before(&self, place: f64) -> bool {
-        matches!(self, Met::At(earlier, _) | Met::Leaves(earlier, ..) if *earlier <= place)
+        matches!(self, Met::At(earlier, _) | Met::Near(earlier, _) | Met::Leaves(earlier, ..) if *earlier <= place)
     }
 }
 
@@ -34,6 +46,19 @@ pub(super) struct Trial<'a> {
     pub signs: &'a [f64],
     /// The switches at whose zeros the part begins.
     pub passed: &'a [usize],
+    /// The switch that has its extremum where the part begins.
+    pub touched: Option<usize>,
+    /// Length of the interval.
+    pub whole: f64,
+}
+
+/// Course of a switch on a trial.
+#[derive(Debug)]
+pub(super) enum Course {
+    /// It vanishes between these places.
+    Crosses([f64; 2]),
+    /// It has an extremum close to zero.
+    Nears(f64),
 }
 
 impl PiecewiseFlow<'_> {
@@ -79,30 +104,72 @@ impl PiecewiseFlow<'_> {
                 }
             }
             let zero = ZERO * sizes[k];
-            let Some([left, right]) = violated(&knots, &margins, zero, &at) else { continue };
-            let place = root(&at, left, right);
+            // Margins of a switch just passed are divided by the position.
+            let near = |s: f64, margin: f64| {
+                let value = if passed { margin * s } else { margin };
+                // Next to the extremum at which the part begins there are others, of rounding.
+                let begins = passed || trial.touched == Some(k);
+                let least = if begins { APART } else { NARROW } * trial.whole;
+                let length = end - begin;
+                trial.whole > SHORT
+                    && value < CLOSE * sizes[k]
+                    && s * length > least
+                    && (1.0 - s) * length > NARROW * trial.whole
+                    && self.is_kink(trial, s, k)
+            };
+            let Some(course) = violated(&knots, &margins, zero, &at, &near) else { continue };
+            let (place, own) = match course {
+                Course::Crosses([left, right]) => {
+                    let place = root(&at, left, right);
+                    (place, Met::At(place, k))
+                }
+                Course::Nears(place) => (place, Met::Near(place, k)),
+            };
             if !met.is_before(place) {
-                met = Met::At(place, k);
+                met = own;
             }
         }
         met
     }
+
+    /// True if f is continuous at the surface of a switch next to a place of a trial. Where it jumps, a node beside the
+    /// surface would hold the orbit to it.
+    fn is_kink(&self, trial: &Trial, s: f64, switch: usize) -> bool {
+        let mut x = vec![0.0; self.n()];
+        self.scheme.value_into(s, trial.nodes, &mut x);
+        let [begin, end] = trial.ends;
+        self.is_continuous(&x, begin + s * (end - begin), trial.signs, switch)
+    }
 }
 
-/// First stretch on which the margins become less than -`zero`, also at an extremum between two places.
-pub(super) fn violated(places: &[f64], margins: &[f64], zero: f64, at: &dyn Fn(f64) -> f64) -> Option<[f64; 2]> {
+/// First stretch on which the margins become less than -`zero`, also at an extremum between two places, or an extremum
+/// before it that is `near` zero.
+pub(super) fn violated(
+    places: &[f64],
+    margins: &[f64],
+    zero: f64,
+    at: &dyn Fn(f64) -> f64,
+    near: &dyn Fn(f64, f64) -> bool,
+) -> Option<Course> {
     let last = places.len() - 1;
     let first = (1..=last).find(|k| margins[*k] < -zero);
     let until = first.unwrap_or(last);
     for k in 1..until.max(2).min(last) {
         let (s, v) = ([places[k - 1], places[k], places[k + 1]], [margins[k - 1], margins[k], margins[k + 1]]);
         let Some(place) = lowest(s, v, at) else { continue };
-        if place < places[until] && at(place) < -zero {
+        if place >= places[until] {
+            continue;
+        }
+        let value = at(place);
+        if value < -zero {
             let before = places.iter().rposition(|p| *p < place).unwrap_or(0);
-            return Some([places[before], place]);
+            return Some(Course::Crosses([places[before], place]));
+        }
+        if near(place, value) {
+            return Some(Course::Nears(place));
         }
     }
-    first.map(|k| [places[k - 1], places[k]])
+    first.map(|k| Course::Crosses([places[k - 1], places[k]]))
 }
 
 /// Place of the minimum between three places, by parabolas.
@@ -178,9 +245,15 @@ mod tests {
             let at = |s: f64| (s - 0.51234f64).powi(2) - depth;
             let places: Vec<f64> = (0..=SECTIONS).map(|k| k as f64 / SECTIONS as f64).collect();
             let margins: Vec<f64> = places.iter().map(|s| at(*s)).collect();
-            let [left, right] = violated(&places, &margins, 0.0, &at).unwrap_or_else(|| panic!("{depth}"));
+            let found = violated(&places, &margins, 0.0, &at, &|_, _| false);
+            let Some(Course::Crosses([left, right])) = found else { panic!("{depth}: {found:?}") };
             let place = root(&at, left, right);
             assert!((place - (0.51234 - depth.sqrt())).abs() < 1e-9, "{depth}: {place}");
         }
+        let above = |s: f64| (s - 0.51234f64).powi(2) + 1e-5;
+        let places: Vec<f64> = (0..=SECTIONS).map(|k| k as f64 / SECTIONS as f64).collect();
+        let margins: Vec<f64> = places.iter().map(|s| above(*s)).collect();
+        let found = violated(&places, &margins, 0.0, &above, &|_, value| value < 1e-4);
+        assert!(matches!(found, Some(Course::Nears(place)) if (place - 0.51234).abs() < 1e-6), "{found:?}");
     }
 }

@@ -77,7 +77,7 @@ impl PiecewiseFlow<'_> {
             }
             let mut matrix = self.matrix(length, &fx);
             let mut pivots = vec![0; n * m];
-            lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+            lu::factorise_scaled(&mut matrix, n * m, &mut pivots, self.setting.scales).ok()?;
             lu::solve(&matrix, n * m, &pivots, &mut rows, width);
             let nodes = [&start[..], &rows].concat();
             start = self.at_end(&nodes, n * width);

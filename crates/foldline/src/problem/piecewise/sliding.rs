@@ -1,5 +1,6 @@
 //! Parts that slide along the surface of a switch at which f jumps.
 
+use super::search::Course;
 use super::{PiecewiseFlow, Trial, ZERO};
 use crate::contract::{Batch, Parameters, VectorField};
 
@@ -60,8 +61,10 @@ impl PiecewiseFlow<'_> {
         let pushes = [(-1.0, below), (1.0, above.iter().map(|speed| -speed).collect())];
         let first = pushes.into_iter().filter_map(|(side, margins)| {
             let at = |s: f64| self.push(trial.nodes, trial.ends, s, trial.signs, switch, side);
-            let [left, right] = super::search::violated(places, &margins, ZERO * size, &at)?;
-            Some((super::search::root(&at, left, right), side))
+            match super::search::violated(places, &margins, ZERO * size, &at, &|_, _| false)? {
+                Course::Crosses([left, right]) => Some((super::search::root(&at, left, right), side)),
+                Course::Nears(_) => None,
+            }
         });
         first.min_by(|a, b| a.0.total_cmp(&b.0))
     }
