@@ -64,6 +64,8 @@ pub enum Command {
     ImportAuto(ImportAuto),
     /// Sample initial states of a model and list the attractors they reach
     Attractors(Attractors),
+    /// Write the ensemble of a model as CUDA or C source, for programs of your own; in Python, foldline.ensemble runs it
+    Emit(Emit),
     /// Check a model or study file for errors
     Check(Check),
     /// Natural frequencies and damping of a rotor over its speed
@@ -558,6 +560,31 @@ pub struct Attractors {
     /// Random seed; the same seed gives the same table
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct Emit {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// CUDA source, for nvcc or CuPy (default)
+    #[arg(long, conflicts_with = "c")]
+    pub cuda: bool,
+    /// The same source with a main program for a C compiler
+    #[arg(long)]
+    pub c: bool,
+    /// Parameters of its own for every trajectory
+    #[arg(long)]
+    pub own_parameters: bool,
+    /// End trajectories where they settle on known solutions
+    #[arg(long)]
+    pub settle: bool,
+    /// Record crossings of a plane, or states at multiples of a time
+    #[arg(long)]
+    pub section: bool,
+    /// File to write [default: the standard output]
+    #[arg(short, long = "output", value_name = "FILE.cu|c")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -3,6 +3,7 @@
 mod arguments;
 mod attractors;
 mod check;
+mod emit;
 mod explore;
 mod export;
 mod failure;
@@ -52,6 +53,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Export(typed)) => export::write(&typed),
         Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
+        Some(Command::Emit(typed)) => emit::write(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
         Some(Command::Campbell(typed)) => rotor::campbell::print(&typed),
         Some(Command::CriticalSpeeds(typed)) => rotor::critical::print(&typed),

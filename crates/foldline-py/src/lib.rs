@@ -6,7 +6,7 @@
 //!
 //! | question | file |
 //! |---|---|
-//! | how is a model read, how is a trajectory integrated? | `model`, `simulation` |
+//! | how is a model read, how is a trajectory integrated? | `model`, `simulation`, `ensemble` |
 //! | what is computed? | `study` |
 //! | how is it computed without the interpreter's lock, and interrupted? | `work`, `patience` |
 //! | what are the results? | `diagram`, `solution` |
@@ -15,6 +15,7 @@
 
 mod bytes;
 mod diagram;
+mod ensemble;
 mod failure;
 mod model;
 mod patience;
@@ -32,6 +33,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::diagram::Diagram;
+    #[pymodule_export]
+    use crate::ensemble::{Emitted, ensemble};
     #[pymodule_export]
     use crate::model::{Model, suggested};
     #[pymodule_export]

@@ -61,6 +61,7 @@ pub mod system;
 mod tests;
 #[cfg(test)]
 mod tests_identity;
+pub mod together;
 
 pub use given::mismatch;
 pub use maps::iterates;

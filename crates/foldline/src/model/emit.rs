@@ -89,7 +89,8 @@ impl Writer {
         let body = own.body(to);
         let used = own.used;
         self.scalars += used.len();
-        self.text += &format!("{head}{{\n    (void)s, (void)t, (void)x;\n{body}{more}}}\n\n");
+        let unused = if head.contains("*g") { ", (void)g" } else { "" };
+        self.text += &format!("{head}{{\n    (void)s, (void)t, (void)x{unused};\n{body}{more}}}\n\n");
         self.tapes.push((code.clone(), used));
     }
 

@@ -12,7 +12,11 @@ FL_FUNCTION double fl_double(unsigned long long bits) { return __longlong_as_dou
 #include <math.h>
 #include <string.h>
 #define FL_FUNCTION static inline
+#ifdef __GNUC__
+#define FL_RARE static __attribute__((unused))
+#else
 #define FL_RARE static
+#endif
 #define FL_TABLE static const double
 #define FL_UNROLL
 FL_FUNCTION unsigned long long fl_bits(double x) { unsigned long long bits; memcpy(&bits, &x, 8); return bits; }

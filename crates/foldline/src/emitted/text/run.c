@@ -221,7 +221,6 @@ FL_FUNCTION void fl_work(const fl_job *job)
 #define FL_BLOCKS 4
 #endif
 /* Set before the kernel starts. */
-extern "C" __constant__ fl_job fl_the_job;
 __constant__ fl_job fl_the_job;
 
 extern "C" __global__ void __launch_bounds__(FL_THREADS, FL_BLOCKS) fl_kernel()
