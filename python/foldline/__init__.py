@@ -15,7 +15,8 @@ from importlib.metadata import version as _version
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
-from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._ensemble import Ensemble, ensemble
+from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._rotor import rotor
@@ -35,8 +36,10 @@ __all__ = [
     "Attractor",
     "Attractors",
     "Branch",
+    "DeviceError",
     "Diagram",
     "EndedShort",
+    "Ensemble",
     "Error",
     "Homotopy",
     "InputError",
@@ -53,6 +56,7 @@ __all__ = [
     "Sweep",
     "TraceError",
     "Trajectory",
+    "ensemble",
     "explore",
     "follow",
     "hold",

@@ -26,6 +26,7 @@
 mod accounts;
 mod arrival;
 mod averaged;
+pub mod basins;
 mod choice;
 mod corner;
 mod counted;

@@ -60,7 +60,7 @@ FL_FUNCTION double fl_tanh(double x)
         const double k = fl_reduce(2.0 * fabs(x), &r, &error);
         const double s = fl_power_of_two(k);
         m = s * (r + (fl_series(r) + error)) + (s - 1.0);
-        m = copysign(fl_divide(m, m + 2.0), x);
+        m = copysign(fl_divide_plain(m, m + 2.0), x);
     }
     return m;
 }
@@ -81,17 +81,23 @@ FL_FUNCTION double fl_sech_squared(double x)
     return fl_divide(4.0 * s, d * d);
 }
 
-FL_FUNCTION double fl_hypot(double a, double b)
+FL_RARE double fl_hypot_scaled(double a, double b)
 {
-    const double square = a * a + b * b;
-    if (fl_plain(square)) {
-        return fl_sqrt(square);
-    }
     const double p = fabs(a), q = fabs(b), m = p > q ? p : q;
     const double big = fl_double((1023ull + 600ull) << 52), small = fl_double((1023ull - 600ull) << 52);
     const double scale = m < 1e-140 ? big : m > 1e150 ? small : 1.0;
     const double back = m < 1e-140 ? small : m > 1e150 ? big : 1.0;
-    return sqrt(p * scale * (p * scale) + q * scale * (q * scale)) * back;
+    return fl_sqrt(p * scale * (p * scale) + q * scale * (q * scale)) * back;
+}
+
+FL_FUNCTION double fl_hypot(double a, double b)
+{
+    const double square = a * a + b * b;
+    double root = fl_sqrt(square);
+    if (!fl_plain(square)) {
+        root = fl_hypot_scaled(a, b);
+    }
+    return root;
 }
 
 FL_FUNCTION double fl_sign(double x)

@@ -41,13 +41,19 @@ FL_FUNCTION double fl_share(double a, double b)
     return a * fl_reciprocal(b);
 }
 
-FL_FUNCTION double fl_divide(double a, double b)
+/* Quotient for a denominator of moderate size. */
+FL_FUNCTION double fl_divide_plain(double a, double b)
 {
     const double first = fl_reciprocal(b), e = fma(-b, first, 1.0);
-    double y = fma(first, fma(e, e, e), first);
-    double q = a * y;
-    q = fma(fma(-b, q, a), y, q);
-    return e == e ? q : a * first;
+    const double y = fma(first, fma(e, e, e), first), q = a * y;
+    return fma(fma(-b, q, a), y, q);
+}
+
+FL_FUNCTION double fl_divide(double a, double b)
+{
+    const unsigned size = __double2hiint(b) & 0x7fffffff;
+    const double q = fl_divide_plain(a, b);
+    return size - 0x00100000u < 0x7fd00000u - 0x00100000u ? q : a * fl_reciprocal(b);
 }
 
 FL_FUNCTION double fl_sqrt(double x)
@@ -59,7 +65,9 @@ FL_FUNCTION double fl_sqrt(double x)
     g = fma(g, r, g);
     h = fma(h, r, h);
     g = fma(fma(-g, g, x), h, g);
-    return g == g ? g : x < 0.0 ? g : x;
+    /* Zero, infinity and NaN are their own roots, up to the sign. */
+    const unsigned size = __double2hiint(x);
+    return size - 0x00100000u < 0x7fe00000u ? g : x < 0.0 ? y : x;
 }
 
 /* Magnitude of the larger of two numbers, to 20 bits. */
@@ -78,6 +86,7 @@ FL_FUNCTION int fl_plain(double square)
 #define FL_QUICK 0
 FL_FUNCTION double fl_share(double a, double b) { return a / b; }
 FL_FUNCTION double fl_divide(double a, double b) { return a / b; }
+FL_FUNCTION double fl_divide_plain(double a, double b) { return a / b; }
 FL_FUNCTION double fl_sqrt(double x) { return sqrt(x); }
 FL_FUNCTION double fl_larger(double a, double b) { return fmax(fabs(a), fabs(b)); }
 FL_FUNCTION int fl_plain(double square) { return square >= 1e-279 && square <= 1e299; }
