@@ -12,6 +12,7 @@
 from importlib.metadata import PackageNotFoundError as _NotFound
 from importlib.metadata import version as _version
 
+from ._basins import Basins, basins
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
@@ -35,6 +36,7 @@ __all__ = [
     "ArgumentError",
     "Attractor",
     "Attractors",
+    "Basins",
     "Branch",
     "DeviceError",
     "Diagram",
@@ -56,6 +58,7 @@ __all__ = [
     "Sweep",
     "TraceError",
     "Trajectory",
+    "basins",
     "ensemble",
     "explore",
     "follow",

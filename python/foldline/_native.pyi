@@ -104,6 +104,17 @@ def simulate(
     parameters: bytes,
     tolerance: float,
 ) -> tuple[tuple[bytes, bytes, bytes, str], BaseException | None]: ...
+def basins(
+    model: Model,
+    parameters: bytes,
+    ranges: bytes,
+    plane: tuple[tuple[int, int], tuple[int, int], bytes] | None,
+    samples: int,
+    seed: int,
+    tolerance: float,
+    jobs: int,
+    limits: tuple[int | None, float | None],
+) -> tuple[list[tuple[Solution, tuple[int, int] | None]], bytes, bytes, bytes, tuple[float, int, int] | None, bytes]: ...
 def ensemble(
     model: Model,
     starts: bytes,

@@ -632,7 +632,7 @@ pub struct Emit {
     /// CUDA source, for nvcc or CuPy (default)
     #[arg(long, conflicts_with = "c")]
     pub cuda: bool,
-    /// The same source with a main program for a C compiler
+    /// C source with a main program, instead of CUDA
     #[arg(long)]
     pub c: bool,
     /// Parameters of its own for every trajectory

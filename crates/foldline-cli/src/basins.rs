@@ -131,27 +131,27 @@ fn table(found: &Basins, model: &Model, with_plane: bool) -> Table {
     if with_plane {
         columns.extend([Column::new("cells", Style::Number), Column::new("of plane", Style::Number)]);
     }
-    let row = |label: String, period: f64, fate: Fate| {
+    let row = |label: String, period: Cell, fate: Fate| {
         let share = found.share(fate);
         let [low, high] = share.interval();
-        let mut row = vec![Cell::Word(label), Cell::Number(period), Cell::Number(share.hits as f64)];
+        let mut row = vec![Cell::Word(label), period, Cell::Count(share.hits as i64)];
         row.extend([share.value(), low, high].map(|value| Cell::Number(rounded(value, share))));
         if with_plane {
             let part = found.part(fate);
-            row.extend([Cell::Number(part.hits as f64), Cell::Number(rounded(part.value(), part))]);
+            row.extend([Cell::Count(part.hits as i64), Cell::Number(rounded(part.value(), part))]);
         }
         row
     };
     let attractors = found.attractors.iter().enumerate().map(|(number, attractor)| {
         let period = match &attractor.point.solution {
-            Solution::Equilibrium(_) => f64::NAN,
-            Solution::Cycle(cycle) => cycle.period,
+            Solution::Equilibrium(_) => Cell::Empty,
+            Solution::Cycle(cycle) => Cell::Number(cycle.period),
         };
         row(name(found, number, model.iterated()), period, Fate::Settled(number))
     });
     let occurred = |fate: &Fate| found.box_fates.contains(fate) || found.plane_fates.contains(fate);
     let lost = LOST.into_iter().filter(|(fate, ..)| occurred(fate));
-    let lost = lost.map(|(fate, name, _)| row(name.to_string(), f64::NAN, fate));
+    let lost = lost.map(|(fate, name, _)| row(name.to_string(), Cell::Empty, fate));
     let rows = attractors.chain(lost).collect();
     Table { columns, rows }
 }
@@ -162,7 +162,7 @@ fn rounded(value: f64, share: Share) -> f64 {
     (value * digits).round() / digits
 }
 
-/// What the fractions are, and how they were decided.
+/// Explains the fractions, and how trajectories were decided.
 fn notes(found: &Basins) -> Result<(), Failure> {
     let mut out = stderr().lock();
     if !found.box_fates.is_empty() {

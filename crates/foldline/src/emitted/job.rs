@@ -1,6 +1,6 @@
 //! The job of an emitted ensemble: its memory layout, and how trajectories ended.
 
-/// How a trajectory ended, as the source numbers it.
+/// Ending of a trajectory, as the source numbers it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
     /// The end of the time span was reached.
