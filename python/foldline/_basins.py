@@ -42,8 +42,8 @@ class Basins:
     cells : array of int, shape (rows, columns)
         Fate of each cell; row 0 has the smallest y.
     early : tuple, or None
-        Distance, relative to the size of an attractor, at which a steady approach counted as settled; number of trajectories that were
-        followed further; number of those that then went elsewhere.
+        For each attractor the distance, relative to its size, at which a steady approach counted as settled, if there is one; number of
+        trajectories that were followed further; number of those that then went elsewhere.
 
     Examples
     --------
@@ -64,7 +64,7 @@ class Basins:
         x: Floats,
         y: Floats,
         cells: Integers,
-        early: tuple[float, int, int] | None,
+        early: tuple[list[float | None], int, int] | None,
     ) -> None:
         self.model = model
         self.attractors = attractors

@@ -114,7 +114,7 @@ def basins(
     tolerance: float,
     jobs: int,
     limits: tuple[int | None, float | None],
-) -> tuple[list[tuple[Solution, tuple[int, int] | None]], bytes, bytes, bytes, tuple[float, int, int] | None, bytes]: ...
+) -> tuple[list[tuple[Solution, tuple[int, int] | None]], bytes, bytes, bytes, tuple[list[float | None], int, int] | None, bytes]: ...
 def ensemble(
     model: Model,
     starts: bytes,

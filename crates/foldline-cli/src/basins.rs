@@ -172,12 +172,16 @@ fn notes(found: &Basins) -> Result<(), Failure> {
             "fraction: of {count} initial states drawn uniformly from the ranges, with its 95 % confidence interval"
         )?;
     }
-    if let Some(early) = found.early {
+    if let Some(early) = found.early.as_ref().filter(|early| early.checked > 0) {
+        let radii: Vec<String> =
+            early.radii.iter().map(|radius| radius.map_or("·".to_string(), |radius| radius.to_string())).collect();
         writeln!(
             out,
-            "early decisions: a steady approach to within {} of the size of an attractor; of {} followed further, {} went \
+            "early decisions: a steady approach to within {} of the sizes of the attractors; of {} followed further, {} went \
              elsewhere",
-            early.radius, early.checked, early.wrong
+            radii.join(", "),
+            early.checked,
+            early.wrong
         )?;
     }
     Ok(())

@@ -22,7 +22,7 @@ type Found<'py> = (
     Bound<'py, PyBytes>,
     Bound<'py, PyBytes>,
     Bound<'py, PyBytes>,
-    Option<(f64, usize, usize)>,
+    Option<(Vec<Option<f64>>, usize, usize)>,
     Bound<'py, PyBytes>,
 );
 
@@ -74,7 +74,7 @@ pub fn basins<'py>(
     let attractors = attractors.map(|own| (Solution::new(own.point, &model.model), own.ratio)).collect();
     let samples = integers(py, found.box_fates.iter().map(|fate| number(*fate)))?;
     let cells = integers(py, found.plane_fates.iter().map(|fate| number(*fate)))?;
-    let early = found.early.map(|early| (early.radius, early.checked, early.wrong));
+    let early = found.early.map(|early| (early.radii, early.checked, early.wrong));
     let drawn = numbers(py, found.samples.into_iter())?;
     let ranges: Vec<f64> = ranges.into_iter().flatten().collect();
     Ok((attractors, samples, cells, drawn, early, numbers(py, ranges.into_iter())?))

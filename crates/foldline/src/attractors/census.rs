@@ -54,9 +54,11 @@ struct Reached {
     first: usize,
     /// Number in the order of discovery.
     number: usize,
+    /// Early decisions for it, about trajectories that were followed until they had settled.
+    forecasts: Forecasts,
 }
 
-/// Decisions at each distance of [`RADII`], about trajectories that were followed until they had settled.
+/// Decisions at each distance of [`RADII`].
 #[derive(Clone, Copy, Debug, Default)]
 struct Forecasts {
     made: [usize; RADII.len()],
@@ -75,8 +77,8 @@ impl Forecasts {
 struct Manner {
     /// Number of steps during which a trajectory is only compared with known solutions.
     patience: usize,
-    /// Index of the distance at which it is decided early.
-    early: Option<usize>,
+    /// True if most are decided early.
+    early: bool,
 }
 
 /// Samples the attractors of an autonomous field; see [`super::survey_until`].
@@ -95,23 +97,22 @@ pub(super) fn survey(
     let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
     let (mut taken, mut ended) = (0, false);
-    let (mut forecasts, mut manner, mut rounds_done) = (Forecasts::default(), Manner::default(), 0);
+    let (mut manner, mut rounds_done) = (Manner::default(), 0);
     while taken < blocks.len() && !ended && !field.ended() {
         let round = [1, rounds[0], rounds[1]][rounds_done.min(2)].min(blocks.len() - taken);
         for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough, manner) {
             ended = watched.ended;
             // Decisions of the first round were made when few solutions were known.
-            let counted = (rounds_done > 0).then_some(&mut forecasts);
-            add(watched, taken * block, (&mut reached, &mut census, counted), sampling.tolerance);
+            let counts = rounds_done > 0;
+            add(watched, taken * block, (&mut reached, &mut census, counts), sampling.tolerance);
             taken += 1;
         }
         rounds_done += 1;
         if map && rounds_done == 2 {
-            manner = Manner { patience: patience(sampling.limits.steps), early: forecasts.radius() };
+            manner = Manner { patience: patience(sampling.limits.steps), early: true };
+            reached.iter_mut().for_each(|known| known.orbit.early = known.forecasts.radius());
         }
     }
-    census.early =
-        manner.early.map(|k| Early { radius: RADII[k], checked: forecasts.made[k], wrong: forecasts.wrong[k] });
     census.left += sampling.samples.saturating_sub(taken * block);
     // Solutions that no sample reached count only if the survey ended early and none of their type was reached.
     let kinds =
@@ -131,6 +132,14 @@ pub(super) fn survey(
             *number = place[*number];
         }
     }
+    census.early = manner.early.then(|| {
+        let decided = || reached.iter().filter_map(|known| Some((known.orbit.early?, known.forecasts)));
+        Early {
+            radii: reached.iter().map(|known| known.orbit.early.map(|k| RADII[k])).collect(),
+            checked: decided().map(|(k, forecasts)| forecasts.made[k]).sum(),
+            wrong: decided().map(|(k, forecasts)| forecasts.wrong[k]).sum(),
+        }
+    });
     let of = sampling.uniform();
     let whole = census.left == 0 && of > 0;
     census.attractors = reached
@@ -158,7 +167,7 @@ fn patience(limit: usize) -> usize {
 fn add(
     watched: Watched,
     first: usize,
-    (reached, census, forecasts): (&mut Vec<Reached>, &mut Census, Option<&mut Forecasts>),
+    (reached, census, counts): (&mut Vec<Reached>, &mut Census, bool),
     tolerance: f64,
 ) {
     census.exits.extend(watched.exits);
@@ -168,18 +177,26 @@ fn add(
         .into_iter()
         .map(|orbit| {
             reached.iter().position(|known| known.orbit.same(&orbit, tolerance)).unwrap_or_else(|| {
-                reached.push(Reached { orbit, hits: 0, uniform: 0, first: 0, number: reached.len() });
+                reached.push(Reached {
+                    orbit,
+                    hits: 0,
+                    uniform: 0,
+                    first: 0,
+                    number: reached.len(),
+                    forecasts: Forecasts::default(),
+                });
                 reached.len() - 1
             })
         })
         .collect();
-    if let Some(forecasts) = forecasts {
+    if counts {
         for (forecast, fate) in watched.forecasts.iter().zip(&watched.fates) {
             for (k, solution) in forecast.iter().enumerate() {
                 let Some(solution) = solution else { continue };
                 let right = matches!(fate, Fate::Settled(index) if place[*index] == place[*solution]);
-                forecasts.made[k] += 1;
-                forecasts.wrong[k] += usize::from(!right);
+                let own = &mut reached[place[*solution]].forecasts;
+                own.made[k] += 1;
+                own.wrong[k] += usize::from(!right);
             }
         }
     }
@@ -359,7 +376,7 @@ fn watch_block(
     let checked = |lane: usize| (lane + 7 * block) % CHECKED == 0;
     for (lane, watch) in watches.iter_mut().enumerate() {
         watch.patience = manner.patience;
-        watch.early = manner.early.filter(|_| !checked(lane));
+        watch.early = manner.early && !checked(lane);
     }
     let (count, mut settled, mut ended) = (watches.len(), 0, false);
     let suffices = |orbits: &[Orbit], hit: &[bool], half: bool| {
@@ -401,8 +418,7 @@ fn watch_block(
     let exits = left.map(|(arrival, _)| Exit { time: arrival.time, state: arrival.state.clone() }).collect();
     hit.resize(orbits.len(), false);
     ended |= suffices(&orbits, &hit, 2 * settled >= count);
-    let forecasts =
-        watches.iter().map(|watch| if watch.early.is_none() { watch.forecasts() } else { Default::default() });
+    let forecasts = watches.iter().map(|watch| if watch.early { Default::default() } else { watch.forecasts() });
     let forecasts = forecasts.collect();
     Watched { orbits, fates, exits, forecasts, ended }
 }

@@ -134,10 +134,11 @@ pub enum Fate {
 }
 
 /// Early decisions of [`survey_map`], and how often they were wrong where the trajectory was followed further.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Early {
-    /// Distance of a steady approach, relative to the size of the attractor, from which a trajectory counts as settled.
-    pub radius: f64,
+    /// For each attractor the distance of a steady approach, relative to its size, from which a trajectory counts as
+    /// settled; `None` where too few decisions were made or some were wrong.
+    pub radii: Vec<Option<f64>>,
     /// Number of trajectories that were followed until they had settled.
     pub checked: usize,
     /// Number of those for which the early decision was wrong.
@@ -203,7 +204,7 @@ pub fn survey_until(
 /// Samples attractors like [`survey`], for so many initial states that most go to attractors that others have found:
 /// maps of basins. The first few thousand are observed as in a survey; they should be spread over all. Later ones are
 /// compared with the known attractors only, and observed from half of their steps on if that does not settle them. They
-/// count as settled at the largest distance of a steady approach at which no decision about the first ones would have
+/// count as settled at the largest distance, for each attractor, at which no decision about the first ones would have
 /// been wrong; one in 64 is followed further to check that ([`Census::early`]).
 pub fn survey_map(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
     survey_at(field, parameters, sampling, polish, (Pace::MAP, &|_| false))

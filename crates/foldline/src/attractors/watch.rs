@@ -45,8 +45,8 @@ pub(super) struct Watch {
     pub(super) settled: Option<usize>,
     /// Number of steps during which it is only compared with known solutions.
     pub(super) patience: usize,
-    /// Index of the distance of [`RADII`] at which it counts as settled.
-    pub(super) early: Option<usize>,
+    /// True if it counts as settled at the distance of each solution for that.
+    pub(super) early: bool,
     steps: usize,
     x: Vec<f64>,
     window: Window,
@@ -68,7 +68,7 @@ impl Watch {
         Watch {
             settled: None,
             patience: 0,
-            early: None,
+            early: false,
             steps: 0,
             x: vec![0.0; n],
             window: Window::new(n),
@@ -116,8 +116,10 @@ impl Watch {
         if self.steps.is_multiple_of(PULSE) {
             step.end_into(&mut self.x);
             self.settled = self.approach.measure(&self.x, known);
-            let early = self.early.and_then(|k| self.approach.forecasts[k]);
-            self.settled = self.settled.or(early);
+            if self.early && self.settled.is_none() {
+                let mut forecasts = self.approach.forecasts.iter().enumerate();
+                self.settled = forecasts.find_map(|(k, own)| own.filter(|own| known[*own].early == Some(k)));
+            }
         }
         if self.settled.is_some() { Verdict::Stop } else { Verdict::Continue }
     }
