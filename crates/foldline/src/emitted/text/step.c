@@ -140,37 +140,31 @@ FL_FUNCTION void fl_stages(const double *s, const double *signs, const double *x
     }
 }
 
+#if !FL_QUICK
 /* Binary logarithm of a positive normal number to 2e-5, and power of 2 to 3e-6 (module `simulation::ensemble::pace`). */
 FL_FUNCTION double fl_log2(double x)
 {
-#if FL_QUICK
-    return (double)__log2f((float)x);
-#else
     const double exponent = fl_double((fl_bits(x) >> 52) | 0x4330000000000000ull) - (4503599627370496.0 + 1023.0);
     const double mantissa = fl_double((fl_bits(x) & ((1ull << 52) - 1ull)) | 0x3ff0000000000000ull);
     const double s = (mantissa - 1.0) / (mantissa + 1.0);
     const double square = s * s;
     const double artanh = s * (1.0 + square * (1.0 / 3.0 + square * (1.0 / 5.0 + square * (1.0 / 7.0))));
     return exponent + 2.0 * 1.4426950408889634 * artanh;
-#endif
 }
 
 FL_FUNCTION double fl_exp2(double x)
 {
-#if FL_QUICK
-    return (double)exp2f((float)x);
-#else
     const double shifted = x + FL_ROUNDER;
     const double y = (x - (shifted - FL_ROUNDER)) * 0.6931471805599453;
     const double power = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
     return fl_double(fl_bits(power) + (fl_bits(shifted) << 52));
-#endif
 }
 
 FL_FUNCTION double fl_second(double error)
 {
     return FL_BETA * fl_log2(error > 1e-4 ? error : 1e-4);
 }
+#endif
 
 FL_FUNCTION int fl_too_small(double h, double time)
 {
