@@ -373,7 +373,7 @@ fn watch_block(
     let mut hit: Vec<bool> = reached.iter().map(|known| known.hits > 0).collect();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
     // Another one in each block, so that they do not form a pattern.
-    let checked = |lane: usize| (lane + 7 * block) % CHECKED == 0;
+    let checked = |lane: usize| (lane + 7 * block).is_multiple_of(CHECKED);
     for (lane, watch) in watches.iter_mut().enumerate() {
         watch.patience = manner.patience;
         watch.early = manner.early && !checked(lane);

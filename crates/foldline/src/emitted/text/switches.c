@@ -251,7 +251,7 @@ FL_RARE int fl_pass(const fl_job *job, fl_run *run, int switch_, double theta)
     if (run->stuck > 50) {
         outcome = FL_STEP_TOO_SMALL;
     } else if (run->stuck > 0) {
-        double speeds[2];
+        double speeds[2] = {0.0, 0.0};
         fl_speeds(FL_S(job, run), FL_TIME(run->x), run->x, run->signs, switch_, speeds);
         if (job->sign * speeds[0] > 0.0 && job->sign * speeds[1] < 0.0) {
             outcome = FL_SLIDES;
