@@ -12,10 +12,12 @@
 from importlib.metadata import PackageNotFoundError as _NotFound
 from importlib.metadata import version as _version
 
+from ._basins import Basins, basins
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
-from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._ensemble import Ensemble, ensemble
+from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._rotor import rotor
@@ -36,10 +38,13 @@ __all__ = [
     "Attractor",
     "Attractors",
     "Band",
+    "Basins",
     "Branch",
     "Derivative",
+    "DeviceError",
     "Diagram",
     "EndedShort",
+    "Ensemble",
     "Error",
     "Homotopy",
     "InputError",
@@ -57,6 +62,8 @@ __all__ = [
     "Sweep",
     "TraceError",
     "Trajectory",
+    "basins",
+    "ensemble",
     "explore",
     "follow",
     "hold",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ._branch import Branch
     from ._diagram import Diagram
+    from ._ensemble import Ensemble
     from ._simulation import Trajectory
 
 
@@ -58,6 +59,10 @@ class RunFileError(Error):
     """A run file cannot be made, read or resumed."""
 
 
+class DeviceError(Error):
+    """There is no graphics card to compute on, or CuPy is missing. The message says which, and what to install."""
+
+
 class EndedShort(UserWarning):
     """Warning that a branch ended before it reached the end of its range."""
 
@@ -67,10 +72,10 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes
     ----------
-    partial : Diagram, Branch or Trajectory
+    partial : Diagram, Branch, Trajectory or Ensemble
         The results so far. Unfinished branches end as "stopped on request". `foldline.rescued()` returns them too.
     """
 
-    def __init__(self, partial: Diagram | Branch | Trajectory) -> None:
+    def __init__(self, partial: Diagram | Branch | Trajectory | Ensemble) -> None:
         super().__init__("stopped on request; the results so far are in the attribute `partial` and in foldline.rescued()")
         self.partial = partial

@@ -111,6 +111,37 @@ def simulate(
     parameters: bytes,
     tolerance: float,
 ) -> tuple[tuple[bytes, bytes, bytes, str], BaseException | None]: ...
+def basins(
+    model: Model,
+    parameters: bytes,
+    ranges: bytes,
+    plane: tuple[tuple[int, int], tuple[int, int], bytes] | None,
+    samples: int,
+    seed: int,
+    tolerance: float,
+    jobs: int,
+    limits: tuple[int | None, float | None],
+) -> tuple[list[tuple[Solution, tuple[int, int] | None]], bytes, bytes, bytes, tuple[list[float | None], int, int] | None, bytes]: ...
+def ensemble(
+    model: Model,
+    starts: bytes,
+    parameters: bytes,
+    own: bool,
+    span: tuple[float, float],
+    scales: bytes,
+    tolerance: float,
+    steps: int,
+    jobs: int,
+) -> tuple[tuple[bytes, bytes, bytes, bytes, bytes], BaseException | None]: ...
+
+class Emitted:
+    source: str
+    states: int
+    scalars: int
+    layout: list[tuple[str, str]]
+    def __init__(self, model: Model, own: bool, settle: bool, section: bool) -> None: ...
+    def values(self, parameters: bytes) -> bytes: ...
+
 def run(
     study: Study,
     given: Mapping[str, Solution],

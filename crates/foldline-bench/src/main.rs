@@ -8,11 +8,13 @@
 //! |---|---|
 //! | how is time measured, in this process and in another? | [`clock`], [`child`] |
 //! | which machine is this? | [`machine`] |
+//! | how are ensembles timed on a card? | [`device`] |
 //! | what is reported, and how? | [`report`] |
 //! | which cases are there? | [`own`], [`peers`] |
 
 mod child;
 mod clock;
+mod device;
 mod machine;
 mod own;
 mod peers;
@@ -28,7 +30,8 @@ const USAGE: &str = "foldline-bench [--peers] [--only PART] [--quick] [--write]
   --peers      compare with AUTO-07p and SciPy too
   --only PART  only the parts whose name contains PART
   --quick      fewer repetitions, no instruction counts
-  --write      write the report to benches/results/DATE.md";
+  --write      write the report to benches/results/DATE.md
+  --device DIR write a folder that times ensembles on a machine with an NVIDIA card, and exit";
 
 /// Allocator of the command `foldline`.
 #[global_allocator]
@@ -59,6 +62,10 @@ fn bench(arguments: &[String]) -> Outcome<()> {
             "--peers" => with_peers = true,
             "--quick" => quick = true,
             "--write" => write = true,
+            "--device" => {
+                let folder = rest.next().ok_or(USAGE)?;
+                return device::write(&Workplace::new(true)?.root, folder.as_ref());
+            }
             "--only" => only = rest.next().ok_or(USAGE)?.clone(),
             _ => return Err(USAGE.into()),
         }

@@ -36,6 +36,12 @@ const VERIFY_CODES: &str = "Exit codes:
   2  error in the command line, or no run in the folder
   3  some number differs by more than its stated error";
 
+const BASINS_CODES: &str = "Exit codes:
+  0  every initial state was followed to an attractor, or to where it left the domain of the model
+  1  failure outside foldline
+  2  error in the command line or in a file
+  3  some initial states did not settle within the limits";
+
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Write a commented model and study as a starting point
@@ -64,6 +70,11 @@ pub enum Command {
     ImportAuto(ImportAuto),
     /// Sample initial states of a model and list the attractors they reach
     Attractors(Attractors),
+    /// Basins of attraction: the fraction of a box of initial states that each attractor takes, and a picture of a plane
+    #[command(after_help = BASINS_CODES)]
+    Basins(Basins),
+    /// Write the ensemble of a model as CUDA or C source, for programs of your own; in Python, foldline.ensemble runs it
+    Emit(Emit),
     /// Check a model or study file for errors
     Check(Check),
     /// Natural frequencies and damping of a rotor over its speed
@@ -594,6 +605,84 @@ pub struct Attractors {
     /// Random seed; the same seed gives the same table
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct Basins {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Set a parameter; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Range of a state for the initial states; can be repeated [default: the ranges of the model]
+    #[arg(long = "range", value_name = "STATE=LOW:HIGH", allow_hyphen_values = true)]
+    pub range: Vec<String>,
+    /// Number of initial states drawn uniformly from the ranges, for the fractions
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(0..=100_000_000))]
+    pub samples: u32,
+    /// Random seed; the same seed gives the same fractions
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Two states that span the plane of the picture, horizontal axis first
+    #[arg(long, value_name = "STATE,STATE")]
+    pub plane: Option<String>,
+    /// Values of the other states in the plane; can be repeated [default: 0, or the nearest value of the range]
+    #[arg(long = "at", value_name = "STATE=VALUE,...", allow_hyphen_values = true, requires = "plane")]
+    pub at: Vec<String>,
+    /// Number of cells along the horizontal axis of the plane, or along both axes as in 512x256
+    #[arg(long, value_name = "N", default_value = "256", value_parser = cells, requires = "plane")]
+    pub cells: [usize; 2],
+    /// Number of threads [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    #[command(flatten)]
+    pub limits: Limits,
+    /// Format of the table
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Picture of the plane; the file extension sets the format
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf", requires = "plane")]
+    pub output: Option<PathBuf>,
+    /// File for the cells of the plane, one per line: both states, and the number of the attractor or the reason why there
+    /// is none
+    #[arg(long, value_name = "FILE.csv", requires = "plane")]
+    pub data: Option<PathBuf>,
+}
+
+/// Parses numbers of cells.
+fn cells(text: &str) -> Result<[usize; 2], String> {
+    let number = |text: &str| text.trim().parse().ok().filter(|count| (1..=16384).contains(count));
+    let found = match text.split_once('x') {
+        Some((x, y)) => number(x).zip(number(y)).map(|(x, y)| [x, y]),
+        None => number(text).map(|count| [count, count]),
+    };
+    found.ok_or_else(|| "expected a number from 1 to 16384, or two as in 512x256".into())
+}
+
+#[derive(Debug, Args)]
+pub struct Emit {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// CUDA source, for nvcc or CuPy (default)
+    #[arg(long, conflicts_with = "c")]
+    pub cuda: bool,
+    /// C source with a main program, instead of CUDA
+    #[arg(long)]
+    pub c: bool,
+    /// Parameters of its own for every trajectory
+    #[arg(long)]
+    pub own_parameters: bool,
+    /// End trajectories where they settle on known solutions
+    #[arg(long)]
+    pub settle: bool,
+    /// Record crossings of a plane, or states at multiples of a time
+    #[arg(long)]
+    pub section: bool,
+    /// File to write [default: the standard output]
+    #[arg(short, long = "output", value_name = "FILE.cu|c")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

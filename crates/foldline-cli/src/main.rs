@@ -2,7 +2,9 @@
 
 mod arguments;
 mod attractors;
+mod basins;
 mod check;
+mod emit;
 mod explore;
 mod export;
 mod failure;
@@ -53,6 +55,8 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Export(typed)) => export::write(&typed),
         Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
+        Some(Command::Basins(typed)) => basins::print(&typed),
+        Some(Command::Emit(typed)) => emit::write(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
         Some(Command::Campbell(typed)) => rotor::campbell::print(&typed),
         Some(Command::CriticalSpeeds(typed)) => rotor::critical::print(&typed),

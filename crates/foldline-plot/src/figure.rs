@@ -213,6 +213,15 @@ pub enum Shape {
     Horizontal(f64),
     /// Shaded interval of the x axis.
     Band([f64; 2]),
+    /// Filled cells of a rectangular grid.
+    Cells {
+        /// Ranges of the grid along both axes.
+        ranges: [[f64; 2]; 2],
+        /// Number of columns.
+        columns: usize,
+        /// True for each filled cell, row by row from below.
+        filled: Vec<bool>,
+    },
     /// Text beside one of several points where there is room for it; left out if there is none.
     Label {
         /// Candidate points, best first.
@@ -333,6 +342,11 @@ impl Layer {
         Layer { opacity: 0.13, ..Layer::new(colour, Shape::Band([from, to])) }
     }
 
+    /// Returns filled cells of a grid over `ranges`, row by row from below.
+    pub fn cells(ranges: [[f64; 2]; 2], columns: usize, filled: Vec<bool>, colour: &'static str) -> Layer {
+        Layer::new(colour, Shape::Cells { ranges, columns, filled })
+    }
+
     /// Returns a text beside a point.
     pub fn note(at: [f64; 2], text: impl Into<String>) -> Layer {
         Layer::new(GREY, Shape::Note { at, text: text.into() })
@@ -348,6 +362,7 @@ impl Layer {
         match &self.shape {
             Shape::Curve { stretches, .. } => stretches.is_empty(),
             Shape::Scatter { points, .. } => points.is_empty(),
+            Shape::Cells { filled, .. } => !filled.contains(&true),
             _ => false,
         }
     }

@@ -176,6 +176,7 @@ fn places(layer: &Layer) -> Vec<[f64; 2]> {
         Shape::Scatter { points, .. } => points.clone(),
         Shape::Circle { centre: [x, y], radius: r } => vec![[x - r, *y], [x + r, *y], [*x, y - r], [*x, y + r]],
         Shape::Stems { peaks, .. } => peaks.iter().flat_map(|[x, y]| [[*x, 0.0], [*x, *y]]).collect(),
+        Shape::Cells { ranges: [[x0, x1], [y0, y1]], .. } => vec![[*x0, *y0], [*x1, *y1]],
         Shape::Vertical(_) | Shape::Horizontal(_) | Shape::Band(_) => Vec::new(),
         Shape::Label { .. } | Shape::Note { .. } => Vec::new(),
     }

@@ -131,7 +131,7 @@ fn entry(out: &mut String, left: f64, y: f64, name: &str, layer: &Layer) {
         Shape::Scatter { marker, filled, .. } => {
             mark(out, *marker, [middle, y], &Layer { width: layer.width.max(2.5), ..layer.clone() }, *filled);
         }
-        Shape::Band(_) => {
+        Shape::Band(_) | Shape::Cells { .. } => {
             let (top, opacity) = (y - 6.0, layer.opacity);
             let _ = writeln!(
                 out,

@@ -7,6 +7,7 @@
 //! Stable pieces are solid, unstable ones dashed, and the change lies exactly at the special point. A branch that
 //! starts at a special point of another has its colour, lighter.
 
+pub mod basins;
 pub mod branches;
 mod compose;
 pub mod curve;

@@ -53,6 +53,7 @@ impl<'f> Painter<'f> {
                 self.path(&ends, layer.dashed);
             }
             Shape::Band(ends) => self.band(*ends, layer.colour),
+            Shape::Cells { ranges, columns, filled } => self.cells(*ranges, *columns, filled, layer.colour),
             Shape::Label { places, text } => {
                 let seen = places.iter().map(|at| self.frame.units(*at)).filter(|at| self.frame.holds(*at));
                 let anchors = seen.map(|at| self.frame.at(at)).collect();
@@ -146,6 +147,27 @@ impl<'f> Painter<'f> {
                 "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"{colour}\" stroke=\"none\"/>"
             );
         }
+    }
+
+    /// Fills cells, those side by side as one rectangle.
+    fn cells(&mut self, [x, y]: [[f64; 2]; 2], columns: usize, filled: &[bool], colour: &str) {
+        let rows = filled.len().checked_div(columns).unwrap_or(0);
+        let corner = |column: usize, row: usize| {
+            let [u, v] = [column as f64 / columns as f64, row as f64 / rows as f64];
+            self.frame.at(self.frame.units([x[0] + u * (x[1] - x[0]), y[0] + v * (y[1] - y[0])]))
+        };
+        let _ = write!(self.lines, "<path fill=\"{colour}\" stroke=\"none\" shape-rendering=\"crispEdges\" d=\"");
+        for (row, cells) in filled.chunks_exact(columns.max(1)).enumerate() {
+            let mut column = 0;
+            for run in cells.chunk_by(|a, b| a == b) {
+                if run[0] {
+                    let ([left, bottom], [right, top]) = (corner(column, row), corner(column + run.len(), row + 1));
+                    let _ = write!(self.lines, "M{left:.2} {top:.2}H{right:.2}V{bottom:.2}H{left:.2}Z");
+                }
+                column += run.len();
+            }
+        }
+        self.lines.push_str("\"/>\n");
     }
 
     /// Draws the outline of a window that another panel shows, with the label of that panel.

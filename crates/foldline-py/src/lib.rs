@@ -6,15 +6,17 @@
 //!
 //! | question | file |
 //! |---|---|
-//! | how is a model read, how is a trajectory integrated? | `model`, `simulation` |
-//! | what is computed? | `study` |
+//! | how is a model read, how is a trajectory integrated? | `model`, `simulation`, `ensemble` |
+//! | what is computed? | `study`, `basins` |
 //! | how is it computed without the interpreter's lock, and interrupted? | `work`, `patience` |
 //! | what are the results? | `diagram`, `solution` |
 //! | how is it drawn? | `pictures` |
 //! | which exceptions report mistakes? | `failure` |
 
+mod basins;
 mod bytes;
 mod diagram;
+mod ensemble;
 mod failure;
 mod model;
 mod patience;
@@ -32,7 +34,11 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
+    use crate::basins::basins;
+    #[pymodule_export]
     use crate::diagram::Diagram;
+    #[pymodule_export]
+    use crate::ensemble::{Emitted, ensemble};
     #[pymodule_export]
     use crate::model::{Model, suggested};
     #[pymodule_export]

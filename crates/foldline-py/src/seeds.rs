@@ -77,14 +77,14 @@ pub fn attractors<'py>(
 }
 
 /// Returns the system with other limits on trajectories if they are given: steps and time.
-fn limited<'a>(mut system: System<'a>, (steps, time): (Option<usize>, Option<f64>)) -> System<'a> {
+pub(crate) fn limited<'a>(mut system: System<'a>, (steps, time): (Option<usize>, Option<f64>)) -> System<'a> {
     system.limits.steps = steps.unwrap_or(system.limits.steps);
     system.limits.time = time.unwrap_or(system.limits.time);
     system
 }
 
 /// Returns the parameters after checking that the model is finite there for some state.
-fn checked(py: Python, model: &Model, parameters: &[u8]) -> PyResult<Vec<f64>> {
+pub(crate) fn checked(py: Python, model: &Model, parameters: &[u8]) -> PyResult<Vec<f64>> {
     let parameters = read(parameters);
     match never_finite(&model.model, &parameters, &model.text, &model.file) {
         Some(found) => Err(failure::of_text(py, &[found])),

@@ -15,6 +15,7 @@
 //! | how is a model written, evaluated, differentiated? | [`model`] |
 //! | which units are there, and how are they converted? | [`units`] |
 //! | how is a trajectory computed? | [`simulation`] |
+//! | … and many on a graphics card? | [`emitted`] |
 //! | which equations define the curve? | [`problem`] |
 //! | how is it followed? | [`continuation`] |
 //! | is it stable? | [`stability`] |
@@ -30,6 +31,7 @@ pub mod continuation;
 pub mod contract;
 pub mod converted;
 pub mod diagram;
+pub mod emitted;
 pub mod explore;
 pub mod linalg;
 pub mod model;

@@ -10,6 +10,7 @@ const MODULES: &[(&str, &[&str])] = &[
     ("converted", &["diagram", "model", "units"]),
     // For the nodes of a mesh interval.
     ("diagram", &["problem"]),
+    ("emitted", &["contract", "model"]),
     (
         "explore",
         &[

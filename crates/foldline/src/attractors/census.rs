@@ -7,8 +7,8 @@ use super::candidate::Context;
 use super::orbit::Orbit;
 use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
-use super::watch::{ARRIVED, Watch};
-use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Polish, Sampling};
+use super::watch::{ARRIVED, RADII, WINDOW, Watch};
+use super::{Attractor, Candidate, Census, Early, Enough, Exit, Fate, Limits, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
 use crate::diagram::{Motion, Point, Response, Share};
 use crate::simulation::{Ensemble, Outcome};
@@ -21,34 +21,28 @@ pub(super) struct Pace {
     pub(super) block: usize,
     /// Relative accuracy of their integration.
     pub(super) accuracy: f64,
+    /// Blocks per round after the first, which is one block, and after the second.
+    rounds: [usize; 2],
+    /// True if trajectories are decided early once enough is known; see [`super::survey_map`].
+    map: bool,
 }
 
 impl Pace {
     /// For a survey of all samples, with the number of hits of each attractor.
-    pub(super) const THOROUGH: Pace = Pace { block: 32, accuracy: 1e-6 };
+    pub(super) const THOROUGH: Pace = Pace { block: 32, accuracy: 1e-6, rounds: [4, 4], map: false };
     /// For a search for certain attractors. Near a basin boundary a trajectory may end on the wrong side.
-    pub(super) const BRIEF: Pace = Pace { block: 16, accuracy: 1e-5 };
+    pub(super) const BRIEF: Pace = Pace { block: 16, accuracy: 1e-5, rounds: [4, 4], map: false };
+    /// For a map of basins: rounds long enough that threads rarely wait for each other.
+    pub(super) const MAP: Pace = Pace { block: 256, accuracy: 1e-6, rounds: [4, 16], map: true };
 }
 
-/// Blocks per round after the first, which is one block. Fixed for the same reason as [`Pace`].
-const ROUND: usize = 4;
+/// In a map, one in this many trajectories is followed until it has settled although it could be decided early.
+const CHECKED: usize = 64;
+/// Number of decisions, all of them right, from which a distance is used: wrong ones are then fewer than 3 %, at a
+/// confidence of 95 %.
+const ENOUGH: usize = 100;
 /// Default limit on the number of steps of a trajectory, beyond which it counts as unsettled: a few thousand periods.
 pub(super) const STEP_LIMIT: usize = 60_000;
-
-/// Outcome of one trajectory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fate {
-    /// Settled on the solution of that index.
-    Settled(usize),
-    Unsettled,
-    Escaped,
-    /// Left the region in which f is defined.
-    Undefined,
-    /// The step size became too small.
-    Stuck,
-    /// Abandoned early.
-    Left,
-}
 
 /// A solution and its hits.
 struct Reached {
@@ -58,6 +52,33 @@ struct Reached {
     uniform: usize,
     /// Index of the first of them.
     first: usize,
+    /// Number in the order of discovery.
+    number: usize,
+    /// Early decisions for it, about trajectories that were followed until they had settled.
+    forecasts: Forecasts,
+}
+
+/// Decisions at each distance of [`RADII`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Forecasts {
+    made: [usize; RADII.len()],
+    wrong: [usize; RADII.len()],
+}
+
+impl Forecasts {
+    /// Index of the largest distance at which enough decisions were made and all were right.
+    fn radius(&self) -> Option<usize> {
+        (0..RADII.len()).find(|&k| self.made[k] >= ENOUGH && self.wrong[k] == 0)
+    }
+}
+
+/// Observation of the trajectories of a round.
+#[derive(Clone, Copy, Debug, Default)]
+struct Manner {
+    /// Number of steps during which a trajectory is only compared with known solutions.
+    patience: usize,
+    /// True if most are decided early.
+    early: bool,
 }
 
 /// Samples the attractors of an autonomous field; see [`super::survey_until`].
@@ -69,19 +90,27 @@ pub(super) fn survey(
     (pace, enough): (Pace, Enough),
 ) -> Census {
     let n = field.dim();
-    let Pace { block, accuracy } = pace;
+    let Pace { block, accuracy, rounds, map } = pace;
     let context = Context { field, parameters, sampling, polish, accuracy };
     let starts = sampling.starts();
     let blocks: Vec<&[f64]> = starts.chunks((block * n).max(1)).collect();
     let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
     let (mut taken, mut ended) = (0, false);
+    let (mut manner, mut rounds_done) = (Manner::default(), 0);
     while taken < blocks.len() && !ended && !field.ended() {
-        let round = if taken == 0 { 1 } else { ROUND.min(blocks.len() - taken) };
-        for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough) {
+        let round = [1, rounds[0], rounds[1]][rounds_done.min(2)].min(blocks.len() - taken);
+        for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough, manner) {
             ended = watched.ended;
-            add(watched, taken * block, &mut reached, &mut census, sampling.tolerance);
+            // Decisions of the first round were made when few solutions were known.
+            let counts = rounds_done > 0;
+            add(watched, taken * block, (&mut reached, &mut census, counts), sampling.tolerance);
             taken += 1;
+        }
+        rounds_done += 1;
+        if map && rounds_done == 2 {
+            manner = Manner { patience: patience(sampling.limits.steps), early: true };
+            reached.iter_mut().for_each(|known| known.orbit.early = known.forecasts.radius());
         }
     }
     census.left += sampling.samples.saturating_sub(taken * block);
@@ -95,6 +124,21 @@ pub(super) fn survey(
         let key = |known: &Reached| known.orbit.point.solution.period().unwrap_or_else(|| known.orbit.norm());
         let cycle = |known: &Reached| known.orbit.point.solution.period().is_some();
         cycle(a).cmp(&cycle(b)).then(b.hits.cmp(&a.hits)).then(key(a).total_cmp(&key(b)))
+    });
+    let mut place = vec![usize::MAX; reached.iter().map(|known| known.number + 1).max().unwrap_or(0)];
+    reached.iter().enumerate().for_each(|(k, known)| place[known.number] = k);
+    for fate in &mut census.fates {
+        if let Fate::Settled(number) = fate {
+            *number = place[*number];
+        }
+    }
+    census.early = manner.early.then(|| {
+        let decided = || reached.iter().filter_map(|known| Some((known.orbit.early?, known.forecasts)));
+        Early {
+            radii: reached.iter().map(|known| known.orbit.early.map(|k| RADII[k])).collect(),
+            checked: decided().map(|(k, forecasts)| forecasts.made[k]).sum(),
+            wrong: decided().map(|(k, forecasts)| forecasts.wrong[k]).sum(),
+        }
     });
     let of = sampling.uniform();
     let whole = census.left == 0 && of > 0;
@@ -114,8 +158,18 @@ pub(super) fn survey(
     census
 }
 
+/// Number of steps during which trajectories of a map are only compared with known solutions: whole windows.
+fn patience(limit: usize) -> usize {
+    limit / 2 / WINDOW * WINDOW
+}
+
 /// Adds the outcome of a block whose samples are numbered from `first`.
-fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut Census, tolerance: f64) {
+fn add(
+    watched: Watched,
+    first: usize,
+    (reached, census, counts): (&mut Vec<Reached>, &mut Census, bool),
+    tolerance: f64,
+) {
     census.exits.extend(watched.exits);
     // A solution found in several blocks counts once.
     let place: Vec<usize> = watched
@@ -123,12 +177,34 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
         .into_iter()
         .map(|orbit| {
             reached.iter().position(|known| known.orbit.same(&orbit, tolerance)).unwrap_or_else(|| {
-                reached.push(Reached { orbit, hits: 0, uniform: 0, first: 0 });
+                reached.push(Reached {
+                    orbit,
+                    hits: 0,
+                    uniform: 0,
+                    first: 0,
+                    number: reached.len(),
+                    forecasts: Forecasts::default(),
+                });
                 reached.len() - 1
             })
         })
         .collect();
+    if counts {
+        for (forecast, fate) in watched.forecasts.iter().zip(&watched.fates) {
+            for (k, solution) in forecast.iter().enumerate() {
+                let Some(solution) = solution else { continue };
+                let right = matches!(fate, Fate::Settled(index) if place[*index] == place[*solution]);
+                let own = &mut reached[place[*solution]].forecasts;
+                own.made[k] += 1;
+                own.wrong[k] += usize::from(!right);
+            }
+        }
+    }
     for (lane, fate) in watched.fates.into_iter().enumerate() {
+        census.fates.push(match fate {
+            Fate::Settled(index) => Fate::Settled(place[index]),
+            other => other,
+        });
         match fate {
             Fate::Settled(index) => {
                 let known = &mut reached[place[index]];
@@ -191,7 +267,7 @@ pub(super) fn settle(
     polish: Polish,
 ) -> Result<Point, Lost> {
     let context = Context { field, parameters, sampling, polish, accuracy: Pace::THOROUGH.accuracy };
-    let mut watched = watch_block(&context, start, &[], &|_| false);
+    let mut watched = watch_block(&context, start, (0, &[]), &|_| false, Manner::default());
     match watched.fates.first() {
         Some(Fate::Settled(index)) if *index < watched.orbits.len() => Ok(watched.orbits.swap_remove(*index).point),
         Some(Fate::Unsettled) => patiently(&context, start, watched.orbits),
@@ -234,7 +310,13 @@ fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Poin
 }
 
 /// Returns the results of the blocks of a round in order, up to the first that ended the survey; uses several threads.
-fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enough: Enough) -> Vec<Watched> {
+fn watch_blocks(
+    context: &Context,
+    blocks: &[&[f64]],
+    reached: &[Reached],
+    enough: Enough,
+    manner: Manner,
+) -> Vec<Watched> {
     let (next, last) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
     let work = || {
         let mut done = Vec::new();
@@ -242,7 +324,7 @@ fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enoug
             let block = next.fetch_add(1, Ordering::Relaxed);
             let going = block <= last.load(Ordering::Relaxed) && !context.field.ended();
             let Some(starts) = blocks.get(block).filter(|_| going) else { return done };
-            let watched = watch_block(context, starts, reached, enough);
+            let watched = watch_block(context, starts, (block, reached), enough, manner);
             if watched.ended {
                 last.fetch_min(block, Ordering::Relaxed);
             }
@@ -272,16 +354,30 @@ struct Watched {
     fates: Vec<Fate>,
     /// Exits of the trajectories that left the region in which f is defined.
     exits: Vec<Exit>,
+    /// Early decisions about those that were followed further.
+    forecasts: Vec<[Option<usize>; RADII.len()]>,
     /// True if everything requested has been found.
     ended: bool,
 }
 
 /// Integrates trajectories together until each has settled, escaped or used up its steps, or until enough is known.
-fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: Enough) -> Watched {
+fn watch_block(
+    context: &Context,
+    starts: &[f64],
+    (block, reached): (usize, &[Reached]),
+    enough: Enough,
+    manner: Manner,
+) -> Watched {
     let n = context.field.dim();
     let mut orbits: Vec<Orbit> = reached.iter().map(|known| known.orbit.clone()).collect();
     let mut hit: Vec<bool> = reached.iter().map(|known| known.hits > 0).collect();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
+    // Another one in each block, so that they do not form a pattern.
+    let checked = |lane: usize| (lane + 7 * block).is_multiple_of(CHECKED);
+    for (lane, watch) in watches.iter_mut().enumerate() {
+        watch.patience = manner.patience;
+        watch.early = manner.early && !checked(lane);
+    }
     let (count, mut settled, mut ended) = (watches.len(), 0, false);
     let suffices = |orbits: &[Orbit], hit: &[bool], half: bool| {
         let sorts: Vec<Sort> =
@@ -322,7 +418,9 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
     let exits = left.map(|(arrival, _)| Exit { time: arrival.time, state: arrival.state.clone() }).collect();
     hit.resize(orbits.len(), false);
     ended |= suffices(&orbits, &hit, 2 * settled >= count);
-    Watched { orbits, fates, exits, ended }
+    let forecasts = watches.iter().map(|watch| if watch.early { Default::default() } else { watch.forecasts() });
+    let forecasts = forecasts.collect();
+    Watched { orbits, fates, exits, forecasts, ended }
 }
 
 /// Properties of a solution on which [`counted`] depends.

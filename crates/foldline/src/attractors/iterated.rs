@@ -10,7 +10,7 @@
 use super::brute_force::{Compare, Report};
 use super::census::Lost;
 use super::settling::Trial;
-use super::{Attractor, Candidate, Census, Enough, Exit, Polish, Sampling};
+use super::{Attractor, Candidate, Census, Enough, Exit, Fate, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Motion, Point, Response, Share, Solution};
 use crate::problem::map::transposed;
@@ -298,7 +298,9 @@ pub(super) fn survey(
         let mut settled = 0;
         for (l, (ended, start)) in ended.iter().zip(starts_of.chunks_exact(n)).enumerate() {
             if ended.motion == Motion::Escaped {
+                let before = census.escaped;
                 lost(&own, ended, &mut census);
+                census.fates.push(if census.escaped > before { Fate::Escaped } else { Fate::Undefined });
                 continue;
             }
             let known = |points: &[Attractor]| {
@@ -320,6 +322,7 @@ pub(super) fn survey(
                     census.attractors.len() - 1
                 }))
             });
+            census.fates.push(place.map_or(Fate::Unsettled, Fate::Settled));
             match place {
                 Some(place) => {
                     census.attractors[place].hits += 1;
@@ -343,7 +346,15 @@ pub(super) fn survey(
         }
     }
     let period = |a: &Attractor| a.point.solution.period().unwrap_or(0.0);
-    census.attractors.sort_by(|a, b| b.hits.cmp(&a.hits).then(period(a).total_cmp(&period(b))));
+    let before = |a: &Attractor, b: &Attractor| b.hits.cmp(&a.hits).then(period(a).total_cmp(&period(b)));
+    let mut order: Vec<usize> = (0..census.attractors.len()).collect();
+    order.sort_by(|a, b| before(&census.attractors[*a], &census.attractors[*b]));
+    for fate in &mut census.fates {
+        if let Fate::Settled(index) = fate {
+            *index = order.iter().position(|own| own == index).unwrap_or(*index);
+        }
+    }
+    census.attractors.sort_by(before);
     census
 }
 

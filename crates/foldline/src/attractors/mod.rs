@@ -111,6 +111,39 @@ pub struct Census {
     pub stuck: usize,
     /// Number of samples not integrated to the end, or not at all, because enough was known; see [`survey_until`].
     pub left: usize,
+    /// `[samples]` outcome of each initial state, in their order; those not begun are missing.
+    pub fates: Vec<Fate>,
+    /// Early decisions, if there were any; see [`survey_map`].
+    pub early: Option<Early>,
+}
+
+/// Outcome of one initial state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// Settled on the attractor of that index.
+    Settled(usize),
+    /// Did not settle within the limits.
+    Unsettled,
+    /// Grew without bound.
+    Escaped,
+    /// Left the region in which f is defined.
+    Undefined,
+    /// The step size became too small.
+    Stuck,
+    /// Abandoned early.
+    Left,
+}
+
+/// Early decisions of [`survey_map`], and how often they were wrong where the trajectory was followed further.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Early {
+    /// For each attractor the distance of a steady approach, relative to its size, from which a trajectory counts as
+    /// settled; `None` where too few decisions were made or some were wrong.
+    pub radii: Vec<Option<f64>>,
+    /// Number of trajectories that were followed until they had settled.
+    pub checked: usize,
+    /// Number of those for which the early decision was wrong.
+    pub wrong: usize,
 }
 
 /// Exit of a trajectory from the region in which f is defined.
@@ -167,6 +200,15 @@ pub fn survey_until(
     enough: Enough,
 ) -> Census {
     survey_at(field, parameters, sampling, polish, (Pace::BRIEF, enough))
+}
+
+/// Samples attractors like [`survey`], for so many initial states that most go to attractors that others have found:
+/// maps of basins. The first few thousand are observed as in a survey; they should be spread over all. Later ones are
+/// compared with the known attractors only, and observed from half of their steps on if that does not settle them. They
+/// count as settled at the largest distance, for each attractor, at which no decision about the first ones would have
+/// been wrong; one in 64 is followed further to check that ([`Census::early`]).
+pub fn survey_map(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
+    survey_at(field, parameters, sampling, polish, (Pace::MAP, &|_| false))
 }
 
 fn survey_at(

@@ -37,6 +37,8 @@ pub(super) struct Orbit {
     states: Vec<f64>,
     /// `[group][n][COARSE]` the coarse samples in units of the scale.
     coarse: Vec<f64>,
+    /// Index of the distance of `watch::RADII` at which a steady approach counts, in a map of basins.
+    pub(super) early: Option<usize>,
 }
 
 /// Returns s of (1) for the samples `[sample][n]` of a cycle.
@@ -98,7 +100,7 @@ impl Orbit {
             (0..n).flat_map(|i| group.iter().map(|x| x[i] / scale[i]).collect::<Vec<f64>>()).collect()
         };
         let coarse = every.chunks(COARSE).flat_map(group).collect();
-        Orbit { point, ratio, scale, states, coarse }
+        Orbit { point, ratio, scale, states, coarse, early: None }
     }
 
     /// Returns the distance (1), searching only between the samples around the nearest coarse sample.

@@ -13,7 +13,7 @@ use crate::diagram::Solution;
 use crate::simulation::Step;
 
 /// Steps per window: a few periods of a cycle, some time constants of an equilibrium.
-const WINDOW: usize = 128;
+pub(super) const WINDOW: usize = 128;
 /// Steps between measurements of the distance to known solutions.
 const PULSE: usize = 16;
 /// Steps after which a first section without a cycle is replaced; each later one lasts twice as long.
@@ -25,6 +25,8 @@ const SHRUNK: f64 = 0.7;
 const CLOSE: f64 = 0.05;
 /// … once the distance has fallen to this fraction of what it was when the approach began.
 const APPROACHED: f64 = 0.5;
+/// Larger distances at which a steady approach may count in a map of basins, the largest first.
+pub(super) const RADII: [f64; 3] = [0.4, 0.2, 0.1];
 /// Distance within which a trajectory that stays there is on the solution: the sag of the polygon that represents it.
 pub(super) const ARRIVED: f64 = 3e-3;
 /// A predicted limit settles a trajectory that is at most this far from the solution …
@@ -41,6 +43,10 @@ const FAITHFUL: f64 = 0.1;
 pub(super) struct Watch {
     /// Index of the solution on which the trajectory was observed to settle.
     pub(super) settled: Option<usize>,
+    /// Number of steps during which it is only compared with known solutions.
+    pub(super) patience: usize,
+    /// True if it counts as settled at the distance of each solution for that.
+    pub(super) early: bool,
     steps: usize,
     x: Vec<f64>,
     window: Window,
@@ -61,6 +67,8 @@ impl Watch {
     pub(super) fn new(n: usize) -> Watch {
         Watch {
             settled: None,
+            patience: 0,
+            early: false,
             steps: 0,
             x: vec![0.0; n],
             window: Window::new(n),
@@ -77,6 +85,9 @@ impl Watch {
 
     /// Evaluates a step; `known` holds the solutions found so far and is extended by those found here.
     pub(super) fn observe(&mut self, step: &Step, known: &mut Vec<Orbit>, context: &Context) -> Verdict {
+        if self.steps < self.patience {
+            return self.compare(step, known);
+        }
         let mut x = std::mem::take(&mut self.x);
         step.end_into(&mut x);
         self.steps += 1;
@@ -91,6 +102,25 @@ impl Watch {
             self.close_window(step, &x, known, context);
         }
         self.x = x;
+        if self.settled.is_some() { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    /// Solution on which the trajectory would have counted as settled at each distance of [`RADII`].
+    pub(super) fn forecasts(&self) -> [Option<usize>; RADII.len()] {
+        self.approach.forecasts
+    }
+
+    /// Compares with the known solutions only.
+    fn compare(&mut self, step: &Step, known: &[Orbit]) -> Verdict {
+        self.steps += 1;
+        if self.steps.is_multiple_of(PULSE) {
+            step.end_into(&mut self.x);
+            self.settled = self.approach.measure(&self.x, known);
+            if self.early && self.settled.is_none() {
+                let mut forecasts = self.approach.forecasts.iter().enumerate();
+                self.settled = forecasts.find_map(|(k, own)| own.filter(|own| known[*own].early == Some(k)));
+            }
+        }
         if self.settled.is_some() { Verdict::Stop } else { Verdict::Continue }
     }
 
@@ -247,6 +277,8 @@ struct Approach {
     first: f64,
     last: f64,
     windows: usize,
+    /// First solution approached to within each distance of [`RADII`].
+    forecasts: [Option<usize>; RADII.len()],
 }
 
 impl Approach {
@@ -257,7 +289,7 @@ impl Approach {
         let distances = known.iter().map(|orbit| orbit.distance(x)).enumerate();
         let (nearest, distance) = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
         if nearest != self.nearest || self.measurements == 0 {
-            *self = Approach { nearest, ..Approach::default() };
+            *self = Approach { nearest, forecasts: self.forecasts, ..Approach::default() };
         }
         self.measurements += 1;
         self.largest = self.largest.max(distance);
@@ -272,6 +304,11 @@ impl Approach {
         }
         self.last = largest;
         let steady = self.windows >= WINDOWS;
+        for (forecast, radius) in self.forecasts.iter_mut().zip(RADII) {
+            if forecast.is_none() && steady && largest <= radius && largest <= APPROACHED * self.first {
+                *forecast = Some(nearest);
+            }
+        }
         let close = largest <= ARRIVED || (largest <= CLOSE && largest <= APPROACHED * self.first);
         (steady && close).then_some(nearest)
     }

@@ -28,6 +28,7 @@ mod arcs;
 mod arrival;
 mod averaged;
 mod axis;
+pub mod basins;
 mod choice;
 mod corner;
 mod counted;
@@ -64,6 +65,7 @@ pub mod system;
 mod tests;
 #[cfg(test)]
 mod tests_identity;
+pub mod together;
 
 pub use axis::axis_of;
 pub(crate) use corner::SLIDING;

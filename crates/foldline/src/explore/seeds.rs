@@ -285,6 +285,15 @@ pub fn attractors(
     })
 }
 
+/// Attractors reached from given initial states `[count][n]`, with the fate of each; see [`crate::attractors::survey_map`].
+pub(super) fn map(system: &System, parameters: &[f64], starts: Vec<f64>, jobs: usize, tolerance: f64) -> Census {
+    let samples = starts.len() / system.field.dim().max(1);
+    let sampling = Sampling { given: Some(starts), ..sampling(system, samples, 0, jobs, tolerance) };
+    attractors::survey_map(system.field, parameters, &sampling, &|candidate| {
+        polish(system, parameters, tolerance, candidate)
+    })
+}
+
 pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
     Sampling {
         ranges: system.ranges.clone(),

@@ -16,6 +16,7 @@ mod compile;
 mod constant;
 mod derive;
 mod dimensions;
+mod emit;
 mod error;
 mod exprel;
 mod family;
@@ -60,6 +61,7 @@ pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
 pub use unsupported::{Unsupported, unsupported};
 
+pub(crate) use emit::{Functions, functions};
 pub(crate) use source::element_of;
 
 use crate::contract::{Batch, Parameters, VectorField};

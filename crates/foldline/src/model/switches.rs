@@ -89,21 +89,9 @@ impl Switches {
     /// [`Switches::given`].
     pub fn sliding(&self, direction: u32, along: usize) -> (Graph, Vec<Id>) {
         let mut graph = self.graph.clone();
-        let [below, above] = [-1.0, 1.0].map(|side| {
-            self.with_signs(&mut graph, &|graph, switch| match switch as usize == along {
-                true => graph.constant(side),
-                false => graph.leaf(Leaf::Direction(direction, switch)),
-            })
-        });
-        let surface = self.switches[along];
-        let [speed_below, speed_above] = [&below, &above].map(|field| {
-            let rate = |graph: &mut Graph, leaf: Leaf| match leaf {
-                Leaf::State(j) => Some(field[j as usize]),
-                Leaf::Time => Some(graph.constant(1.0)),
-                _ => None,
-            };
-            graph.derivative(&[surface], rate)[0]
-        });
+        let sides = self.sides(&mut graph, direction, along);
+        let [speed_below, speed_above] = self.normal_speeds(&mut graph, &sides, along);
+        let [below, above] = sides;
         let apart = graph.subtract(speed_below, speed_above);
         let share = graph.divide(speed_below, apart);
         let slides = below.iter().zip(&above).map(|(below, above)| {
@@ -113,6 +101,38 @@ impl Switches {
         });
         let slides = slides.collect();
         (graph, slides)
+    }
+
+    /// a and b of (4) for the surface of a switch, with the signs of the others as in [`Switches::given`].
+    pub fn speeds(&self, direction: u32, along: usize) -> (Graph, Vec<Id>) {
+        let mut graph = self.graph.clone();
+        let sides = self.sides(&mut graph, direction, along);
+        let speeds = self.normal_speeds(&mut graph, &sides, along).to_vec();
+        (graph, speeds)
+    }
+
+    /// f⁻ and f⁺ of (4).
+    fn sides(&self, graph: &mut Graph, direction: u32, along: usize) -> [Vec<Id>; 2] {
+        [-1.0, 1.0].map(|side| {
+            self.with_signs(graph, &|graph, switch| match switch as usize == along {
+                true => graph.constant(side),
+                false => graph.leaf(Leaf::Direction(direction, switch)),
+            })
+        })
+    }
+
+    /// a and b of (4).
+    fn normal_speeds(&self, graph: &mut Graph, sides: &[Vec<Id>; 2], along: usize) -> [Id; 2] {
+        let surface = self.switches[along];
+        [0, 1].map(|side| {
+            let field = &sides[side];
+            let rate = |graph: &mut Graph, leaf: Leaf| match leaf {
+                Leaf::State(j) => Some(field[j as usize]),
+                Leaf::Time => Some(graph.constant(1.0)),
+                _ => None,
+            };
+            graph.derivative(&[surface], rate)[0]
+        })
     }
 
     fn with_signs(&self, graph: &mut Graph, sign: &dyn Fn(&mut Graph, u32) -> Id) -> Vec<Id> {
