@@ -83,7 +83,8 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let mut run = read(&typed.folder, part)?;
     let record = std::mem::take(&mut run.plan.record);
     let recorded: Vec<Quantity> = record.iter().map(|(_, quantity)| *quantity).collect();
-    if typed.what() == What::Points && recorded.iter().any(|quantity| quantity.needs_profile()) {
+    if matches!(typed.what(), What::Points | What::Special) && recorded.iter().any(|quantity| quantity.needs_profile())
+    {
         run = read(&typed.folder, Part::Everything)?;
     }
     if matches!(typed.what(), What::Points | What::Special) {

@@ -7,9 +7,7 @@ use super::{System, corner};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{
-    Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Shown, Solution, SpecialPoint,
-};
+use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
 use crate::problem::map::MapProblem;
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
