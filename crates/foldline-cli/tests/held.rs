@@ -195,9 +195,9 @@ fn folds_of_cycles_are_found_where_the_amplitude_is_held() {
 #[test]
 fn a_fixed_point_of_a_map_keeps_a_state() {
     // Hénon: x = 1 - a x² + b x with x = ½: a = 2 + 2 b; period doubling at b - 2 a x = 1 + … of the trace.
-    let model = "name = \"henon\"\n[parameters]\na = 0.5\nb = 0.3\n[states]\nx = { range = [-1, 1] }\ny = { range = [-1, 1] }\n\
+    let model = "name = \"henon\"\n[parameters]\na = 0.1\nb = 0.3\n[states]\nx = { range = [-1, 1] }\ny = { range = [-1, 1] }\n\
         [map]\nx = \"1 - a*x^2 + y\"\ny = \"b*x\"\n";
-    let study = "[[seed]]\nname = \"s\"\nstate = { x = 0.8, y = 0.2 }\n\
+    let study = "[[seed]]\nname = \"s\"\nstate = { x = 1.2, y = 0.35 }\n\
         [[branch]]\nname = \"h\"\nfrom = \"s\"\nfree = [\"b\", \"a\"]\nhold = { x_max = 0.5 }\nrange = [-0.9, 0.9]\n";
     let (_, diagram) = run(model, study);
     let own = branch(&diagram, "h");

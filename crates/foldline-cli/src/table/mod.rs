@@ -97,9 +97,8 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let record = std::mem::take(&mut run.plan.record);
     let recorded: Vec<Quantity> = record.iter().map(|(_, quantity)| *quantity).collect();
     // The states at the ends of an interval are part of the profiles too.
-    let at_ends = run.model.conditions() != [0, 0] && matches!(typed.what(), What::Points | What::Special);
-    let needed = typed.what() == What::Points && recorded.iter().any(|quantity| quantity.needs_profile());
-    if at_ends || needed {
+    let profiled = run.model.conditions() != [0, 0] || recorded.iter().any(|quantity| quantity.needs_profile());
+    if matches!(typed.what(), What::Points | What::Special) && profiled {
         run = read(&typed.folder, Part::Everything)?;
     }
     if matches!(typed.what(), What::Points | What::Special) {
