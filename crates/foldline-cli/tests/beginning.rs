@@ -172,7 +172,7 @@ fn unsupported_features_are_explained() {
     };
     let expected: [(&str, &[&str]); 9] = [
         ("map = true", &["study.toml:2:1", "[map] takes the place of [equations]", "next value"]),
-        ("boundary-conditions = []", &["boundary-value problems", "AUTO-07p"]),
+        ("boundary-conditions = []", &["boundary-value problem", "[boundary]"]),
         ("delays = [1]", &["delay differential equations", "DDE-BIFTOOL"]),
         ("torus = 1", &["invariant tori", "[[curve]]"]),
         ("homoclinic = 1", &["connecting orbits", "HomCont"]),
