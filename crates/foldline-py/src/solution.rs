@@ -86,7 +86,9 @@ impl Solution {
 
     /// Real and imaginary parts of eigenvalues or multipliers.
     fn spectrum<'py>(&self, py: Python<'py>) -> Array<'py> {
-        counted(py, 2 * self.point.spectrum.len(), parts(&self.point.spectrum))
+        // A boundary-value problem has no multipliers.
+        let known = if self.model.conditions() == [0, 0] { &self.point.spectrum[..] } else { &[] };
+        counted(py, 2 * known.len(), parts(known))
     }
 
     /// Ranges of states and outputs, `[n + outputs][2]`.

@@ -33,10 +33,12 @@ const HIGHEST: usize = 40;
 pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) -> (Value, Vec<Vec<f64>>) {
     let values: Vec<Option<f64>> = quantities.iter().map(|quantity| quantity.of(point)).collect();
     let trust = point.trust;
+    // A boundary-value problem has no multipliers.
+    let known = if model.conditions() == [0, 0] { &point.spectrum[..] } else { &[] };
     let mut header = json!({
         "position": point.position, "values": values, "unstable": point.unstable,
-        "spectrum": point.spectrum.iter().map(|z| [z.re, z.im]).collect::<Vec<_>>(),
-        "trivial": point.spectrum.len() - point.free_spectrum().len(),
+        "spectrum": known.iter().map(|z| [z.re, z.im]).collect::<Vec<_>>(),
+        "trivial": known.len().saturating_sub(point.free_spectrum().len()),
         "trust": {
             "discretisation": trust.discretisation, "residual": trust.residual, "trivial": trust.trivial_defect,
             "liouville": trust.liouville_defect, "spectrum": trust.spectrum,

@@ -20,6 +20,7 @@ use crate::diagnostic::Diagnostic;
 use crate::order::{names, ordered};
 use crate::run_file::{Part, Reading, RunFileError};
 use crate::study_file::{Study, parse_study_of_run};
+use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::model::Model;
@@ -118,6 +119,10 @@ impl Export {
     fn shown(&self, mut point: Point) -> Point {
         let recorded: Vec<Quantity> = self.study.plan.record.iter().map(|(_, quantity)| *quantity).collect();
         append(&mut point, &recorded, &self.study.model);
+        if self.study.model.conditions() != [0, 0] {
+            // A boundary-value problem has no multipliers.
+            point.spectrum.clear();
+        }
         if let Some(conversion) = &self.conversion {
             conversion.point(&mut point);
         }
