@@ -87,35 +87,6 @@ fn clear(values: &[f64; 5]) -> bool {
     low > 0.5 * high
 }
 
-/// Zero of the trajectory between two places, at which the interpolant has opposite signs: that of the interpolant, and
-/// secants. A value of the trajectory costs as much as a step. `None` if this does not converge.
-fn closely(value: &mut impl FnMut(f64, bool) -> f64, [a, b]: [f64; 2], ends: [f64; 2]) -> Option<f64> {
-    const ROUNDS: usize = 4;
-    /// Change after which a secant is exact to rounding, and half the distance for the first slope.
-    const SETTLED: f64 = 1e-9;
-    const APART: f64 = 1e-4;
-    let mut theta = root(|theta| value(theta, false), [a, b], ends, SETTLED);
-    let [low, high] = [(theta - APART).max(a), (theta + APART).min(b)];
-    let mut slope = (value(high, false) - value(low, false)) / (high - low);
-    let mut last: Option<[f64; 2]> = None;
-    for _ in 0..ROUNDS {
-        let own = value(theta, true);
-        if let Some([before, at_before]) = last.filter(|[before, _]| *before != theta) {
-            slope = (own - at_before) / (theta - before);
-        }
-        let next = theta - own / slope;
-        if !(next > a && next < b) {
-            return None;
-        }
-        if (next - theta).abs() < SETTLED {
-            return Some(next);
-        }
-        last = Some([theta, own]);
-        theta = next;
-    }
-    None
-}
-
 /// First zero along the step of a function that is given at the start and at [`PLACES`], and at any state.
 fn zero(
     step: &Step,
@@ -149,10 +120,6 @@ fn zero(
                 return Some(a);
             }
             a = summit;
-        }
-        let first = if a == pair[0][0] { ga } else { value(a, false) };
-        if let Some(theta) = closely(&mut value, [a, b], [first, gb]) {
-            return Some(theta);
         }
         let ends = [if a == 0.0 { ga } else { value(a, true) }, value(b, true)];
         // Ignore a sign change of the interpolant that the trajectory does not share: it is below the tolerance.
