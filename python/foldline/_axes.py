@@ -12,7 +12,19 @@ if TYPE_CHECKING:
 #: Distinguishable with all common types of colour vision (Okabe and Ito), as in the pictures of the command line.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 #: Markers of matplotlib for the shapes that the command line draws.
-MARKS = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "nabla": "v", "right": ">", "left": "<", "cross": "x", "plus": "+", "star": "*", "dot": "."}
+MARKS = {
+    "circle": "o",
+    "square": "s",
+    "diamond": "D",
+    "triangle": "^",
+    "nabla": "v",
+    "right": ">",
+    "left": "<",
+    "cross": "x",
+    "plus": "+",
+    "star": "*",
+    "dot": ".",
+}
 
 
 def _pyplot() -> Any:

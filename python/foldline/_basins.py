@@ -88,6 +88,15 @@ class Basins:
         -------
         tuple of three floats
             Estimate from the samples, and its 95 % confidence interval (Wilson).
+
+        Examples
+        --------
+        >>> import foldline
+        >>> box = dict(range=(-2, 2))
+        >>> model = foldline.model(equations={"x": "v", "v": "x - x^3 - 0.5*v"}, states={"x": box, "v": box})
+        >>> share, low, high = foldline.basins(model, samples=256).share(0)
+        >>> bool(low < 0.5 < high)
+        True
         """
         hits, of = float(np.count_nonzero(self.fates == fate)), float(len(self.fates))
         if not of:
@@ -108,6 +117,14 @@ class Basins:
         Returns
         -------
         float
+
+        Examples
+        --------
+        >>> import foldline
+        >>> box = dict(range=(-2, 2))
+        >>> model = foldline.model(equations={"x": "v", "v": "x - x^3 - 0.5*v"}, states={"x": box, "v": box})
+        >>> foldline.basins(model, samples=0, plane=("x", "v"), cells=16).part(0)
+        0.5
         """
         return float(np.mean(self.cells == fate)) if self.cells.size else float("nan")
 
@@ -142,7 +159,14 @@ class Basins:
         half = [0.5 * (own[1] - own[0]) if len(own) > 1 else 0.5 for own in (self.x, self.y)]
         extent = (self.x[0] - half[0], self.x[-1] + half[0], self.y[0] - half[1], self.y[-1] + half[1])
         axes.imshow(
-            place, origin="lower", extent=extent, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(kinds) - 0.5, aspect="auto", interpolation="nearest"
+            place,
+            origin="lower",
+            extent=extent,
+            cmap=ListedColormap(colours),
+            vmin=-0.5,
+            vmax=len(kinds) - 0.5,
+            aspect="auto",
+            interpolation="nearest",
         )
         names = [LOST[own] if own < 0 else self.attractors[own]._what() for own in kinds]
         said = [f"{name}: {100 * self.part(own):.1f} %" for name, own in zip(names, kinds, strict=True)]

@@ -15,9 +15,9 @@ from ._arguments import (
     call_of,
     check_free,
     check_frees,
-    check_names,
     check_marks,
     check_model,
+    check_names,
     check_parameters,
     check_point,
     check_range,
@@ -312,8 +312,9 @@ def follow(
     >>> bool(branch["mu"].max() == 2)
     True
     """
-    several = hold is not None or not isinstance(free, str)
-    frees: list[str] = check_frees(free, hold, start) if several else [free]  # type: ignore[list-item]
+    listed = isinstance(free, Sequence) and not isinstance(free, str) and all(isinstance(own, str) for own in free)
+    several = hold is not None or listed
+    frees: list[Any] = check_frees(free, hold, start) if several else [free]
     first = frees[0]
     check_solution(start, call_of("follow", first, range))
     check_free(first, start.model, "foldline.follow(start, {}, (0.5, 4))")
@@ -324,7 +325,7 @@ def follow(
         ranges = {own: check_range(pair, call) for own, pair in range.items()}
         check_within(start, first, ranges.get(first))
     else:
-        ranges = check_range(range, call, missing)  # type: ignore[arg-type]
+        ranges = check_range(range, call, missing)
         check_within(start, first, ranges)
     check_switch(switch)
     check_marks("mark", mark)

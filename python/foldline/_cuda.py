@@ -33,13 +33,15 @@ class Ends(NamedTuple):
 def _cupy() -> Any:
     """Returns CuPy with a card, or says what is missing."""
     try:
-        import cupy
+        import cupy  # pyright: ignore[reportMissingImports]
     except ImportError as error:
         raise DeviceError("CuPy is not installed\n  help: pip install foldline[cuda], or device='cpu'") from error
     try:
         count = cupy.cuda.runtime.getDeviceCount()
     except Exception as error:
-        raise DeviceError(f"CuPy finds no NVIDIA driver: {error}\n  help: a machine with an NVIDIA card and its driver, or device='cpu'") from error
+        raise DeviceError(
+            f"CuPy finds no NVIDIA driver: {error}\n  help: a machine with an NVIDIA card and its driver, or device='cpu'"
+        ) from error
     if count == 0:
         raise DeviceError("there is no NVIDIA card\n  help: a machine with one, or device='cpu'")
     return cupy
@@ -53,7 +55,9 @@ def _kernel(source: str) -> tuple[Any, Any]:
         module = cupy.RawModule(code=source, options=("-std=c++14",))
         return module, module.get_function("fl_kernel")
     except cupy.cuda.compiler.CompileException as error:
-        raise DeviceError(f"the kernel does not compile: {error}\n  help: report it with the model; device='cpu' needs no kernel") from error
+        raise DeviceError(
+            f"the kernel does not compile: {error}\n  help: report it with the model; device='cpu' needs no kernel"
+        ) from error
 
 
 def job_type(emitted: Any) -> np.dtype[Any]:

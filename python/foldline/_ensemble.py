@@ -46,7 +46,7 @@ class Ensemble:
     >>> import foldline
     >>> model = foldline.model(equations={"x": "x - x^3"})
     >>> ends = foldline.ensemble(model, [[-0.5], [0.5], [2.0]], 30.0)
-    >>> ends["x"].round(6).tolist(), set(ends.endings.tolist())
+    >>> ends["x"].round(4).tolist(), set(ends.endings.tolist())
     ([-1.0, 1.0, 1.0], {'reached'})
     """
 
@@ -168,7 +168,15 @@ def _made(model: Model, starts: Floats, parts: Any, device: str) -> Ensemble:
 
 
 def _on_processor(
-    model: Model, starts: Floats, values: Floats, own: bool, ends: tuple[float, float], scales: Floats, tolerance: float, steps: int, jobs: Any
+    model: Model,
+    starts: Floats,
+    values: Floats,
+    own: bool,
+    ends: tuple[float, float],
+    scales: Floats,
+    tolerance: float,
+    steps: int,
+    jobs: Any,
 ) -> Any:
     (states, times, outcomes, accepted, rejected), interrupt = _native.ensemble(
         model._native, raw(starts), raw(values), own, ends, raw(scales), tolerance, steps, processors(jobs)
@@ -181,7 +189,9 @@ def _starts(model: Model, starts: Any) -> Floats:
     at = finite("starts", starts)
     n = len(model.states)
     if at.ndim != 2 or at.shape[1] != n:
-        raise InputError(f"starts has the shape {at.shape}\n  help: (count, {n}): a row for each trajectory, a column for each of {', '.join(model.states)}")
+        raise InputError(
+            f"starts has the shape {at.shape}\n  help: (count, {n}): a row for each trajectory, a column for each of {', '.join(model.states)}"
+        )
     return np.ascontiguousarray(at)
 
 

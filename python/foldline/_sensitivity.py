@@ -206,7 +206,8 @@ def spreads(model: Model, given: Mapping[str, Any]) -> dict[str, tuple[float, fl
     for name, own in given.items():
         if name not in model.parameters:
             raise ArgumentError(f"{name}: the model has no such parameter\n  help: one of {', '.join(model.parameters)}")
-        low, high = own if isinstance(own, (tuple, list)) and len(own) == 2 else (own, None)
+        pair: tuple[Any, Any] | list[Any] = own if isinstance(own, (tuple, list)) and len(own) == 2 else (own, None)
+        low, high = pair[0], pair[1]
         try:
             low, high = float(low), None if high is None else float(high)
         except (TypeError, ValueError):

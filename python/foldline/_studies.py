@@ -40,7 +40,9 @@ def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
     """Returns an item of a study without the keys not given, and with hyphens in kinds of special points, as in files."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
-        if key in kept:
+        if isinstance(kept.get(key), Mapping):
+            kept[key] = {name: [end("the range", own) for own in ends] for name, ends in kept[key].items()}
+        elif key in kept:
             kept[key] = [end("the range", own) for own in kept[key]]
     if "switch" in kept:
         kept["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in kept["switch"].items()}

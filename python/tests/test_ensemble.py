@@ -17,7 +17,7 @@ def pendulum():
     return foldline.model(
         equations={"x": "v", "v": "-sin(x) - d*v + a*cos(w*t)"},
         parameters={"d": 0.2, "a": 0.3, "w": 0.7},
-        forcing={"period": "2*pi/w"},
+        period="2*pi/w",
     )
 
 
