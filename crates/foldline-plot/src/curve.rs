@@ -2,7 +2,7 @@
 
 use crate::figure::Vertex;
 use crate::quantity::drawn;
-use foldline::diagram::{Branch, Ending, Kind, Point};
+use foldline::diagram::{Branch, Ending, Kind, Point, SpecialPoint};
 use foldline::special::quantity::Quantity;
 
 /// A piece of a branch of uniform stability.
@@ -73,8 +73,13 @@ fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
         vertices.push(place(point, x, y).map(|at| (at, stable && !silent)));
         stable = point.unstable == 0;
         while let Some(special) = specials.next_if(|s| s.point.position <= point.position) {
-            vertices.push(place(&special.point, x, y).map(|at| (at, special.unstable_before == 0)));
+            let at = place(&special.point, x, y);
+            vertices.push(at.map(|at| (at, special.unstable_before == 0)));
             stable = special.unstable_after == 0;
+            if has_corner(special) {
+                // The curve is rounded on either side, but not across.
+                vertices.extend([None, at.map(|at| (at, stable))]);
+            }
         }
     }
     let closed = branch.ends.iter().flatten().any(|end| *end == Ending::Closed);
@@ -84,6 +89,12 @@ fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     }
     let parts = vertices.split(Option::is_none);
     parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<Vertex>| !s.is_empty()).collect()
+}
+
+/// True if the branch has a corner at a special point: its direction jumps there.
+fn has_corner(special: &SpecialPoint) -> bool {
+    special.kind == Kind::BoundaryEquilibrium
+        || special.kind == Kind::Grazing && special.remark.starts_with("grazing-sliding")
 }
 
 /// True if a branch that closes around a circle returns to a copy of its start, a full turn away: the segment that
