@@ -286,6 +286,12 @@ impl Marker {
             Kind::Sliding => Marker::Plus,
             Kind::Peak => Marker::Nabla,
             Kind::Mark => Marker::Dot,
+            Kind::Homoclinic | Kind::Heteroclinic => Marker::Dot,
+            Kind::NeutralSaddle => Marker::Circle,
+            Kind::DoubleEigenvalue | Kind::ThreeLeading => Marker::Triangle,
+            Kind::OrbitFlip => Marker::Cross,
+            Kind::NonCentral => Marker::Nabla,
+            Kind::ShilnikovHopf => Marker::Diamond,
             Kind::Unexplained => Marker::Star,
         }
     }

@@ -165,6 +165,20 @@ pub trait VectorField: Send + Sync {
     /// lanes]`; `[i·n × lanes]` and `[i·q × lanes]`, ordered as by [`VectorField::linearise`].
     fn integrands(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 3]) {}
 
+    /// Lets the conditions of a boundary-value problem refer to a solution with these states at its ends, by a change of
+    /// parameters that belong to the conditions alone.
+    fn refer(&self, _ends: [&[f64]; 2], _parameters: &mut [f64]) {}
+
+    /// Estimates `[b]` of the terms that the conditions at the ends neglect; empty if they are exact.
+    fn remainders(&self, _ends: [&[f64]; 2], _parameters: &[f64]) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// For orbits that connect equilibria, the eigenvalues at the one where they begin and at the one where they end.
+    fn saddles(&self, _parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+        None
+    }
+
     /// Rates of change of a switching function under the branches of f on its negative and on its positive side,
     /// ∇h·f + h_t: `[lanes]` each. `at.signs` selects the branch of the other switches.
     fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {

@@ -23,7 +23,7 @@ pub(super) const KEYS: [&str; 12] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 7] = [
+const HELD: [Kind; 8] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -31,6 +31,7 @@ const HELD: [Kind; 7] = [
     Kind::Torus,
     Kind::Grazing,
     Kind::BoundaryEquilibrium,
+    Kind::Homoclinic,
 ];
 
 /// Branch on which the special point lies.
@@ -103,6 +104,7 @@ pub(super) fn read(
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus | Kind::Grazing => Some(Family::Cycle),
+        Kind::Homoclinic => Some(Family::Arc),
         Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
     };
@@ -199,6 +201,9 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     let wrong = match (kind, family) {
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
+        }
+        (Kind::Homoclinic, Some(Family::Equilibrium)) => {
+            Some(("a homoclinic orbit is the limit of cycles, not of equilibria", "homoclinic, `of` a branch of cycles"))
         }
         (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
             "equilibria have only folds, branch points and Hopf points",

@@ -353,11 +353,28 @@ pub enum Kind {
     Peak,
     /// A stability change that no located special point explains.
     Unexplained,
+    /// An orbit that leaves an equilibrium and returns to it; curves of such orbits only.
+    Homoclinic,
+    /// An orbit that leads from one equilibrium to another; curves of such orbits only.
+    Heteroclinic,
+    /// On a curve of connecting orbits: the leading eigenvalues on both sides of the imaginary axis have equal distances
+    /// from it, so that the saddle quantity vanishes.
+    NeutralSaddle,
+    /// On a curve of connecting orbits: two leading eigenvalues meet and become complex (Belyakov).
+    DoubleEigenvalue,
+    /// On a curve of connecting orbits: a complex pair and a real eigenvalue lead together.
+    ThreeLeading,
+    /// On a curve of connecting orbits: the orbit returns outside of the leading eigenspace.
+    OrbitFlip,
+    /// On a curve of homoclinic orbits: the saddle becomes a saddle-node, at which the orbit is non-central.
+    NonCentral,
+    /// On a curve of homoclinic orbits: the equilibrium has a Hopf bifurcation (Shilnikov–Hopf).
+    ShilnikovHopf,
 }
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 26] = [
+    pub const ALL: [Kind; 34] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -384,6 +401,14 @@ impl Kind {
         Kind::Mark,
         Kind::Peak,
         Kind::Unexplained,
+        Kind::Homoclinic,
+        Kind::Heteroclinic,
+        Kind::NeutralSaddle,
+        Kind::DoubleEigenvalue,
+        Kind::ThreeLeading,
+        Kind::OrbitFlip,
+        Kind::NonCentral,
+        Kind::ShilnikovHopf,
     ];
 
     /// True for bifurcations of codimension two.
@@ -391,6 +416,7 @@ impl Kind {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
             && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::Peak)
+            && !matches!(self, Kind::Homoclinic | Kind::Heteroclinic)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -440,6 +466,14 @@ impl Kind {
             Kind::Mark => "mark",
             Kind::Peak => "peak",
             Kind::Unexplained => "unexplained",
+            Kind::Homoclinic => "homoclinic",
+            Kind::Heteroclinic => "heteroclinic",
+            Kind::NeutralSaddle => "neutral-saddle",
+            Kind::DoubleEigenvalue => "double-eigenvalue",
+            Kind::ThreeLeading => "three-leading-eigenvalues",
+            Kind::OrbitFlip => "orbit-flip",
+            Kind::NonCentral => "saddle-node-homoclinic",
+            Kind::ShilnikovHopf => "shilnikov-hopf",
         }
     }
 
@@ -461,6 +495,12 @@ impl Kind {
             Kind::Resonance14 => "1:4 resonance",
             Kind::DoubleTorus => "double torus",
             Kind::BoundaryEquilibrium => "boundary equilibrium",
+            Kind::NeutralSaddle => "neutral saddle",
+            Kind::DoubleEigenvalue => "double eigenvalue",
+            Kind::ThreeLeading => "three leading eigenvalues",
+            Kind::OrbitFlip => "orbit flip",
+            Kind::NonCentral => "saddle-node homoclinic",
+            Kind::ShilnikovHopf => "Shilnikov–Hopf",
             other => other.name(),
         }
     }

@@ -13,7 +13,7 @@ use crate::diagram::{Cycle, Point, Solution};
 /// Unknowns near a solution, by damped Newton steps at fixed parameters from a guess that may be far away; `None` if
 /// none of them helps. A step is halved until the correction that would follow it, with the same matrix, is shorter: the
 /// natural monotonicity test (deuflhard2011, §3.1), which does not depend on the units of the equations.
-fn damped(problem: &mut dyn ZeroProblem, guess: &Point) -> Option<Vec<f64>> {
+pub(super) fn damped(problem: &mut dyn ZeroProblem, guess: &Point) -> Option<Vec<f64>> {
     /// Relative correction at which undamped steps converge.
     const CLOSE: f64 = 0.1;
     /// A bound on the work; each step costs one matrix.

@@ -1,5 +1,6 @@
 //! A vector field that counts its evaluations.
 
+use num_complex::Complex64;
 use crate::contract::{Batch, VectorField};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -108,6 +109,18 @@ impl VectorField for Counted<'_> {
 
     fn integrands(&self, at: Batch, free: &[usize], to: [&mut [f64]; 3]) {
         self.field.integrands(at, free, to);
+    }
+
+    fn refer(&self, ends: [&[f64]; 2], parameters: &mut [f64]) {
+        self.field.refer(ends, parameters);
+    }
+
+    fn remainders(&self, ends: [&[f64]; 2], parameters: &[f64]) -> Vec<f64> {
+        self.field.remainders(ends, parameters)
+    }
+
+    fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+        self.field.saddles(parameters)
     }
 
     fn linearise_outputs(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) -> bool {

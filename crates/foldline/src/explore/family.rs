@@ -4,7 +4,7 @@ use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
 use super::plan::{BranchPlan, Holds, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, arrival, crossings, curves, discovery, holds, homotopy, known, switch};
+use super::{System, arrival, connections, crossings, curves, discovery, holds, homotopy, known, switch};
 use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
@@ -203,7 +203,11 @@ impl Work<'_> {
                 continue;
             };
             let earlier = self.earlier.branch(&curve.name);
-            let (branch, going) = curves::follow(self.system, self.plan, curve, &parent, earlier, self.observer);
+            let follow = match curve.hold {
+                Kind::Homoclinic | Kind::Heteroclinic => connections::follow,
+                _ => curves::follow,
+            };
+            let (branch, going) = follow(self.system, self.plan, curve, &parent, earlier, self.observer);
             let ended = curves::end_of(self.system, self.plan, curve, &branch);
             self.branches.push(branch);
             if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {

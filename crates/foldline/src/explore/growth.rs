@@ -48,7 +48,7 @@ impl Line {
     }
 
     /// Returns the setting of this curve at given parameters.
-    fn setting<'a>(&self, system: &'a System, parameters: &[f64]) -> Setting<'a> {
+    pub(super) fn setting<'a>(&self, system: &'a System, parameters: &[f64]) -> Setting<'a> {
         let others = system.holds.filter(|_| self.held.is_none()).into_iter().flat_map(|holds| &holds.others);
         let determined = system.field.determined().iter().copied();
         let first = determined.chain(others.map(|(index, _)| *index)).chain(self.held.map(|(_, first)| first));

@@ -6,6 +6,7 @@
 //! Results computed meanwhile are wrong, so events are dropped from then on, and the run file holds what was accepted
 //! before.
 
+use num_complex::Complex64;
 use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
 use crate::diagram::{Branch, Point, Shortfall};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -180,6 +181,18 @@ impl VectorField for Interruptible<'_> {
 
     fn integrands(&self, at: Batch, free: &[usize], to: [&mut [f64]; 3]) {
         self.field.integrands(at, free, to);
+    }
+
+    fn refer(&self, ends: [&[f64]; 2], parameters: &mut [f64]) {
+        self.field.refer(ends, parameters);
+    }
+
+    fn remainders(&self, ends: [&[f64]; 2], parameters: &[f64]) -> Vec<f64> {
+        self.field.remainders(ends, parameters)
+    }
+
+    fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+        self.field.saddles(parameters)
     }
 
     fn linearise_outputs(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) -> bool {

@@ -30,6 +30,7 @@ mod averaged;
 mod axis;
 pub mod basins;
 mod choice;
+mod connections;
 mod corner;
 mod counted;
 pub mod course;

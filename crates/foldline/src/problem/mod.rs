@@ -4,10 +4,12 @@
 //! |---|---|---|
 //! | equilibria | x, λ | [`equilibrium`] |
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
+//! | orbits that connect equilibria | profile, T, the equilibria, two parameters | [`connecting`] |
 //! | cycles of maps | all iterates, λ | [`map`] |
 //! | bifurcation points | those of either problem with two parameters, and extra ones of the condition | [`held`] |
 
 pub mod averages;
+pub mod connecting;
 pub mod cycle;
 pub mod defect;
 pub mod equilibrium;

@@ -33,6 +33,7 @@ mod map_operator;
 pub mod mark;
 pub mod normal_form;
 pub mod on_branch_points;
+pub mod on_connections;
 pub mod on_cycle_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
@@ -82,7 +83,10 @@ pub fn monitors_where_held<'a>(
     held: Kind,
     free: usize,
 ) -> Vec<Box<dyn Monitor + 'a>> {
-    let mut all = codim_two::monitors(field, scales, family, held);
+    let mut all = match held {
+        Kind::Homoclinic | Kind::Heteroclinic => on_connections::monitors(field),
+        _ => codim_two::monitors(field, scales, family, held),
+    };
     all.push(Box::new(fold::Turn { free }));
     all
 }

@@ -304,7 +304,7 @@ impl CycleProblem<'_> {
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         let mut errors: Vec<f64> = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
         let mut degeneracy = 0.0;
-        if self.is_open() {
+        if self.is_open() && self.setting.field.saddles(&parameters).is_none() {
             let (others, off) = self.errors_of_response(u, &scale);
             errors.iter_mut().zip(others).for_each(|(own, other)| *own = own.max(other));
             degeneracy = off;

@@ -481,6 +481,9 @@ impl ZeroProblem for CycleProblem<'_> {
         self.anchored.clear();
         self.anchored.extend_from_slice(u);
         self.unphased = true;
+        if self.is_open() {
+            self.refer(u);
+        }
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
@@ -673,7 +676,8 @@ impl ZeroProblem for CycleProblem<'_> {
             let half = 0.5 * self.setting.field.periods().get(c).copied().unwrap_or(*gain).abs();
             (found.ranges[c], found.averages[c]) = ([-half, half], [f64::NAN; 2]);
         }
-        found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
+        let truncated = self.truncation(u);
+        found.trust.discretisation = truncated + SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
         found.trust.residual = residual;
         found.trust.slope = self.slope_error();
         found
@@ -691,6 +695,9 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn margin(&self, at: &Point) -> f64 {
+        if self.setting.field.saddles(&at.parameters).is_some() {
+            return f64::INFINITY;
+        }
         at.free_spectrum().iter().map(|z| (z - 1.0).norm()).fold(f64::INFINITY, f64::min)
     }
 

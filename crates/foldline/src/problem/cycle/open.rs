@@ -154,9 +154,41 @@ impl CycleProblem<'_> {
         x.copy_from_slice(&found[..known]);
     }
 
+    /// Lets the conditions refer to the solution `u`.
+    pub(super) fn refer(&mut self, u: &[f64]) {
+        let size = self.profile_size();
+        let mut parameters = self.setting.at(&u[size + 1..]);
+        let [left, right] = self.both_ends(u);
+        self.setting.field.refer([&left, &right], &mut parameters);
+        self.setting.parameters = parameters;
+    }
+
+    /// Estimated error of `u` from terms that the conditions at the ends neglect, relative; the last factorisation must
+    /// be one near `u`.
+    pub fn truncation(&self, u: &[f64]) -> f64 {
+        let (size, first, n) = (self.profile_size(), (self.intervals() - 1) * self.block(), self.n);
+        let [left, right] = self.both_ends(u);
+        let left_out = match self.is_open() {
+            true => self.setting.field.remainders([&left, &right], &self.setting.at(&u[size + 1..])),
+            false => Vec::new(),
+        };
+        if left_out.is_empty() {
+            return 0.0;
+        }
+        let (mut rhs, mut shift) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        rhs[first..first + n].copy_from_slice(&left_out[..n]);
+        rhs[size + 1..size + 1 + left_out.len() - n].copy_from_slice(&left_out[n..]);
+        self.solve_open(&rhs, &mut shift);
+        self.relative_size(&shift, u)
+    }
+
     /// The number 1 - d of (3) in place of a spectrum, from the last factorisation.
     pub(super) fn degeneracy(&self, u: &[f64]) -> Examination {
         let count = u.len();
+        if let Some([spectrum, _]) = self.setting.field.saddles(&self.setting.at(&u[self.profile_size() + 1..])) {
+            let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
+            return Examination { spectrum, unstable, ..Examination::default() };
+        }
         let orientation = self.system.ends().map_or(1.0, Ends::orientation);
         let (mut right, mut x) = (vec![0.0; count], vec![0.0; count]);
         right[count - 1] = 1.0;

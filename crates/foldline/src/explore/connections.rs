@@ -1,0 +1,484 @@
+//! Orbits that connect equilibria, followed in two parameters.
+//!
+//! **Idea.** A branch of cycles that ends with a period without bound leads to a homoclinic orbit: the last cycle is cut
+//! where it is closest to the equilibrium, and the ends are moved onto its invariant subspaces. The orbit is then
+//! lengthened by the linear flow next to the equilibrium until the estimated error of its truncation is far below the
+//! tolerance, and followed as a curve.
+
+use super::System;
+use super::arcs::damped;
+use super::growth::{self, Beginning, Growth, Line};
+use super::plan::{CurvePlan, Plan};
+use super::seeds::bare;
+use crate::continuation::Settings;
+use crate::continuation::corrector::parameter_row;
+use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
+use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution};
+use crate::linalg::{lu, max_abs};
+use crate::problem::connecting::{ConnectingField, Split};
+use crate::problem::cycle::CycleProblem;
+use crate::problem::gauss::Scheme;
+
+/// Factor on the plan's tolerance, as for other curves.
+const SHARPER: f64 = 0.2;
+/// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
+const MARGIN: f64 = 0.02;
+/// Number of times that an orbit is lengthened. The error is at least quartered each time.
+const LENGTHENINGS: usize = 14;
+/// Smallest distance from the equilibria, in units of the sizes of the states, at which rounding does not matter yet.
+const LEAST: f64 = 1e-6;
+
+/// Follows a curve of connecting orbits, or the part of it that is missing; `parent` is the branch at whose end it
+/// starts. Returns the curve, and false if the observer wants to stop.
+pub(super) fn follow(
+    system: &System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    parent: &Branch,
+    earlier: Option<&Branch>,
+    observer: &dyn Observer,
+) -> (Branch, bool) {
+    let first = parent.free;
+    let known = earlier.filter(|branch| !branch.points.is_empty());
+    let start = match known.and_then(|branch| branch.points.iter().find(|p| p.position == 0)) {
+        Some(point) => revived(system, curve, point),
+        None => at_end(system, plan, curve, parent),
+    };
+    let parameter = start.as_ref().map_or(f64::NAN, |start| start.point.parameters[first]);
+    let origin = match curve.hold {
+        Kind::Homoclinic | Kind::Heteroclinic => Origin::EndOf(parent.name.clone()),
+        kind => Origin::Switch { parent: parent.name.clone(), kind, parameter },
+    };
+    let mut branch = known.cloned().unwrap_or_else(|| Branch::new(&curve.name, Family::Arc, curve.free, origin));
+    branch.held = Some((curve.hold, first));
+    let begun = start.and_then(|start| {
+        system.repeats(&start.point.parameters, &[(first, curve.ranges[0]), (curve.free, curve.ranges[1])])?;
+        Ok(start)
+    });
+    let going = match begun {
+        Ok(start) => {
+            let own = start.system(system);
+            let value = start.point.parameters[curve.free];
+            let (settings, sides) = settings(&own, plan, curve, first, value);
+            let growth = Growth {
+                system: &own,
+                settings: &settings,
+                degree: plan.degree,
+                ties: Vec::new(),
+                sides,
+                parents: &[],
+                marks: &curve.marks,
+                observer,
+                whole: false,
+                sparse: false,
+            };
+            if known.is_some() {
+                growth.resume(&mut branch)
+            } else {
+                let line = Line { held: branch.held, ..Line::new(curve.free) };
+                let mut problem = line.problem(&own, plan.degree, &start.point);
+                match growth::polished(&mut *problem, &settings, &start.point) {
+                    Ok(station) => growth.begin(&mut branch, Beginning::Inside(station)),
+                    Err(why) => super::family::without_start(observer, &mut branch, why.to_string()),
+                }
+            }
+        }
+        Err(why) => super::family::without_start(observer, &mut branch, why),
+    };
+    (branch, going)
+}
+
+fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value: f64) -> (Settings, [bool; 2]) {
+    let [own, second] = curve.ranges;
+    let (range, sides) = match curve.until {
+        Some(target) if target >= value => ([second[0].min(value), target], [false, true]),
+        Some(target) => ([target, second[1].max(value)], [true, false]),
+        None => (second, [true, true]),
+    };
+    let usual = growth::settings(system, SHARPER * plan.tolerance, range, curve.max_points);
+    (Settings { bounds: vec![(first, own)], stability: false, ..usual }, sides)
+}
+
+/// A connecting orbit with its field.
+struct Start<'s> {
+    field: ConnectingField<'s>,
+    point: Point,
+}
+
+impl<'s> Start<'s> {
+    /// The system of the curve. The sizes of the further parameters come from its first point.
+    fn system<'o>(&'o self, system: &System<'o>) -> System<'o>
+    where
+        's: 'o,
+    {
+        let n = self.field.dim();
+        let mut parameter_scales = system.parameter_scales.clone();
+        parameter_scales.resize(system.field.parameter_count(), 1.0);
+        parameter_scales.push(self.field.time_unit(&self.point.parameters));
+        while parameter_scales.len() < self.field.parameter_count() {
+            parameter_scales.extend_from_slice(&system.scales);
+        }
+        parameter_scales.truncate(self.field.parameter_count());
+        System {
+            field: &self.field,
+            parameter_scales,
+            reflections: vec![vec![false; n]],
+            mirrors: Vec::new(),
+            holds: None,
+            unfolded: None,
+            ..system.clone()
+        }
+    }
+
+    /// Sizes ε of the point.
+    fn cycle(&self) -> Option<&Cycle> {
+        match &self.point.solution {
+            Solution::Cycle(cycle) => Some(cycle),
+            Solution::Equilibrium(_) => None,
+        }
+    }
+}
+
+/// Number of unstable eigenvalues of an equilibrium.
+fn unstable(system: &System, x: &[f64], parameters: &[f64]) -> Option<usize> {
+    let probe = ConnectingField::new(system.field, &system.scales, 1, 0);
+    let all = probe.parameters(parameters, 1.0, x, [1.0; 2], &[]);
+    Some(probe.split(0, &all)?.unstable())
+}
+
+/// The field of a stored orbit.
+fn revived<'s>(system: &'s System, curve: &CurvePlan, point: &Point) -> Result<Start<'s>, String> {
+    let places = if curve.hold == Kind::Heteroclinic { 2 } else { 1 };
+    let field = ConnectingField::new(system.field, &system.scales, places, 0);
+    let place = point.parameters.get(field.place(0)).unwrap_or_default().to_vec();
+    let count = unstable(system, &place, &point.parameters)
+        .ok_or_else(|| "the equilibrium of the stored orbit is not hyperbolic".to_string())?;
+    Ok(Start { field: ConnectingField::new(system.field, &system.scales, places, count), point: point.clone() })
+}
+
+/// The homoclinic orbit that the cycles at an end of a branch approach, at the values that the last cycle has of all
+/// parameters but the branch's.
+///
+/// # Errors
+/// A sentence that says why there is none.
+fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branch) -> Result<Start<'s>, String> {
+    if system.field.forced() || system.field.switch_count() > 0 {
+        return Err(format!(
+            "{} orbits are followed for smooth autonomous models only\nlikely cause: the right-hand side depends on \
+             time or has switching points\nwhat to do: smooth the switching points, or repeat the branch of cycles at \
+             several values of the second parameter",
+            curve.hold
+        ));
+    }
+    let value = |point: &Point| point.parameters.get(parent.free).copied().unwrap_or(f64::NAN);
+    let unbounded = |ending: &Option<Ending>| match ending {
+        Some(Ending::Connecting { connection, .. }) => Some(Some(*connection)),
+        Some(Ending::PeriodUnbounded(_)) => Some(None),
+        _ => None,
+    };
+    let ends = [(parent.points.first(), 0), (parent.points.last(), 1)];
+    let mut fitting: Vec<(&Point, Option<Connection>)> = ends
+        .into_iter()
+        .filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?)))
+        .collect();
+    let near = curve.near.unwrap_or(f64::NAN);
+    fitting.sort_by(|a, b| (value(a.0) - near).abs().total_cmp(&(value(b.0) - near).abs()));
+    let Some((point, connection)) = fitting.last().filter(|_| curve.near.is_none()).or(fitting.first()) else {
+        let ends = parent.ends.iter().flatten().map(Ending::brief).collect::<Vec<_>>().join("; ");
+        return Err(format!(
+            "no end of the branch {} has a period that grows without bound ({ends})\nlikely cause: the branch stopped \
+             before it came close to the {} orbit\nwhat to do: widen its range, or give it more `max-points`",
+            parent.name, curve.hold
+        ));
+    };
+    match (curve.hold, connection) {
+        (Kind::Homoclinic, Some(Connection::SaddleNode)) => Err(format!(
+            "the cycles of {} approach an orbit homoclinic to a saddle-node, not to a saddle\nlikely cause: the period \
+             becomes infinite where two equilibria meet on the cycle\nwhat to do: follow the fold of the equilibria with \
+             `hold = \"fold\"`, on which such orbits lie",
+            parent.name
+        )),
+        (Kind::Homoclinic, Some(Connection::Heteroclinic)) => Err(format!(
+            "the cycles of {} approach a heteroclinic cycle between several saddles\nlikely cause: the model is \
+             symmetric, or the cycle passes near more than one saddle\nwhat to do: use `hold = \"heteroclinic\"`",
+            parent.name
+        )),
+        (Kind::Heteroclinic, _) => cut(system, plan, curve, parent.free, point, true),
+        _ => cut(system, plan, curve, parent.free, point, false),
+    }
+}
+
+/// Point of a cycle between two others: its state, its distance from the equilibrium, and the speed.
+fn slowest(system: &System, cycle: &Cycle, parameters: &[f64]) -> (f64, Vec<f64>) {
+    let n = system.field.dim();
+    let mut best = (f64::INFINITY, 0.0, vec![0.0; n]);
+    for pair in cycle.mesh.windows(2) {
+        for t in [pair[0], 0.5 * (pair[0] + pair[1])] {
+            let x = cycle.state(t);
+            let mut f = vec![0.0; n];
+            let at = Parameters::Shared(parameters);
+            system.field.evaluate(Batch { lanes: 1, states: &x, parameters: at, times: &[], signs: &[] }, &mut f);
+            let speed = system.norm(&f);
+            if speed < best.0 {
+                best = (speed, t, x);
+            }
+        }
+    }
+    (best.1, best.2)
+}
+
+/// The equilibrium to which Newton's method leads from `x`.
+fn equilibrium(system: &System, x: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
+    const ITERATIONS: usize = 30;
+    let (n, mut x) = (x.len(), x.to_vec());
+    for _ in 0..ITERATIONS {
+        let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
+        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
+        system.field.linearise(at, &[], &mut f, &mut fx, &mut []);
+        let mut pivots = vec![0; n];
+        lu::factorise(&mut fx, n, &mut pivots).ok()?;
+        lu::solve(&fx, n, &pivots, &mut f, 1);
+        x.iter_mut().zip(&f).for_each(|(x, d)| *x -= d);
+        if system.norm(&f) <= 1e-12 * (1.0 + system.norm(&x)) {
+            return max_abs(&x).is_finite().then_some(x);
+        }
+    }
+    None
+}
+
+/// The homoclinic orbit near a cycle of long period, from the piece of the cycle between its departure from the
+/// equilibrium and its return.
+fn cut<'s>(
+    system: &'s System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    first: usize,
+    point: &Point,
+    between_two: bool,
+) -> Result<Start<'s>, String> {
+    let Solution::Cycle(cycle) = &point.solution else {
+        return Err("the branch consists of equilibria; a homoclinic orbit needs a branch of cycles".into());
+    };
+    if between_two {
+        return Err(
+            "heteroclinic orbits are not started from cycles yet\nwhat to do: give both equilibria and a profile".into()
+        );
+    }
+    let (slow, x) = slowest(system, cycle, &point.parameters);
+    let place = equilibrium(system, &x, &point.parameters)
+        .ok_or_else(|| "Newton's method finds no equilibrium next to the slowest point of the last cycle".to_string())?;
+    let count = unstable(system, &place, &point.parameters).filter(|count| (1..x.len()).contains(count));
+    let count = count.ok_or_else(|| {
+        let state: Vec<String> = place.iter().map(|x| format!("{:.6}", Shown(*x))).collect();
+        format!(
+            "the equilibrium ({}) next to the slowest point of the last cycle is not a saddle",
+            state.join(", ")
+        )
+    })?;
+    let field = ConnectingField::new(system.field, &system.scales, 1, count);
+    let probe = field.parameters(&point.parameters, 1.0, &place, [1.0; 2], &cycle.gain);
+    let split = field.split(0, &probe).ok_or("the equilibrium is not hyperbolic")?;
+    let sides = Departure { field: &field, split: &split, probe: &probe, cycle, slow };
+    let (from, to, size) = sides.piece().ok_or_else(|| {
+        "the last cycle does not come close enough to the equilibrium\nlikely cause: its period is not long yet\nwhat to \
+         do: follow the branch of cycles further, with more `max-points`"
+            .to_string()
+    })?;
+    let length = (to - from) * cycle.period;
+    let scheme = Scheme::new(plan.degree);
+    let inner = (0..3).flat_map(|turn| cycle.mesh.iter().map(move |t| t + f64::from(turn) - 1.0));
+    let mut mesh: Vec<f64> = vec![from];
+    mesh.extend(inner.filter(|t| *t > from + 1e-9 && *t < to - 1e-9));
+    mesh.push(to);
+    mesh.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+    let profile = sampled(&mesh, &scheme, &|t| cycle.state(t));
+    let mesh: Vec<f64> = mesh.iter().map(|t| (t - from) / (to - from)).collect();
+    let parameters = field.parameters(&point.parameters, length, &place, [size; 2], &cycle.gain);
+    let solution = Cycle {
+        period: length,
+        forcing_periods: 1,
+        mesh: mesh.into(),
+        degree: plan.degree,
+        profile,
+        gain: vec![0.0; x.len()],
+    };
+    settled(system, plan, curve, first, Start { field, point: bare(&parameters, Solution::Cycle(solution)) })
+}
+
+/// States at the nodes of a mesh, from a function of time.
+fn sampled(mesh: &[f64], scheme: &Scheme, state: &dyn Fn(f64) -> Vec<f64>) -> Vec<f64> {
+    let nodes = mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
+    nodes.flat_map(state).collect()
+}
+
+/// A cycle next to a saddle.
+struct Departure<'d> {
+    field: &'d ConnectingField<'d>,
+    split: &'d Split,
+    probe: &'d [f64],
+    cycle: &'d Cycle,
+    /// Time in periods at which the cycle is slowest.
+    slow: f64,
+}
+
+impl Departure<'_> {
+    /// Lengths of the stable and unstable parts of the deviation from the saddle at a time in periods, counted from that
+    /// at which the cycle is slowest, where it leaves; on return, after a period.
+    fn parts(&self, t: f64) -> [f64; 2] {
+        let x = self.cycle.state(self.slow + t);
+        let end = usize::from(t > 0.5);
+        let [leaving, returning] = self.field.deviations([&x, &x], self.probe);
+        let y = if end == 0 { leaving } else { returning };
+        [self.split.length(&y, -1.0), self.split.length(&y, 1.0)]
+    }
+
+    /// Times, in periods, at which the cycle leaves and re-enters a neighbourhood of the saddle, and the size of that: a
+    /// tenth of the largest distance, or less if the linear flow determines the orbit better there.
+    fn piece(&self) -> Option<(f64, f64, f64)> {
+        const SAMPLES: usize = 4000;
+        const SHARE: f64 = 0.05;
+        let all: Vec<[f64; 2]> = (0..=SAMPLES).map(|k| self.parts(k as f64 / SAMPLES as f64)).collect();
+        let far = all.iter().map(|[s, u]| s.hypot(*u)).fold(0.0, f64::max);
+        let near = all.iter().map(|[s, u]| s.hypot(*u)).fold(f64::INFINITY, f64::min);
+        let size = (SHARE * far).max(3.0 * near);
+        if size > 0.5 * far {
+            return None;
+        }
+        let half = SAMPLES / 2;
+        let from = (0..half).find(|k| all[*k][1] >= size)?;
+        let to = (half..=SAMPLES).rev().find(|k| all[*k][0] >= size)?;
+        // The slowest point may lie on either side of the closest one.
+        let step = 1.0 / SAMPLES as f64;
+        Some((self.slow + from as f64 * step, self.slow + to as f64 * step, size))
+    }
+}
+
+/// The problem of the orbit in the branch's parameter, with the second one last, which stays.
+fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usize, degree: usize) -> CycleProblem<'s> {
+    let line = Line { held: Some((Kind::Homoclinic, first)), ..Line::new(free) };
+    let setting = line.setting(system, &start.point.parameters);
+    let cycle = match &start.point.solution {
+        Solution::Cycle(cycle) => cycle.clone(),
+        Solution::Equilibrium(_) => Cycle {
+            period: 1.0,
+            forcing_periods: 1,
+            mesh: vec![0.0, 1.0].into(),
+            degree,
+            profile: Vec::new(),
+            gain: Vec::new(),
+        },
+    };
+    CycleProblem::like(setting, &cycle)
+}
+
+/// Solves for the orbit at fixed values of all parameters but the first, and lengthens it until its truncation does not
+/// matter.
+fn settled<'s>(
+    base: &System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    first: usize,
+    mut start: Start<'s>,
+) -> Result<Start<'s>, String> {
+    let tolerance = SHARPER * plan.tolerance;
+    let mut coarse = true;
+    for _ in 0..LENGTHENINGS {
+        let system = start.system(base);
+        let settings = growth::settings(&system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+        let mut problem = problem_of(&start, &system, first, curve.free, plan.degree);
+        let mut point = start.point.clone();
+        if let Some(u) = damped(&mut problem, &point) {
+            point = problem.point(&u, &[], Examination::default());
+        }
+        let found = growth::polished(&mut problem, &settings, &point).map_err(|why| {
+            let how = if coarse { "cut at the equilibrium" } else { "after it was lengthened next to the equilibrium" };
+            format!(
+                "Newton's method does not lead from the last cycle, {how}, to a {} orbit: {why}\nlikely cause: the cycle \
+                 is still far from it\nwhat to do: follow the branch of cycles further, with a smaller tolerance or \
+                 more `max-points`",
+                curve.hold
+            )
+        })?;
+        problem.set_mesh(&found.mesh);
+        let row = parameter_row(found.u.len());
+        let error = match problem.factorise(&found.u, &row) {
+            Ok(()) => problem.truncation(&found.u),
+            Err(_) => f64::NAN,
+        };
+        let point = found.point;
+        drop(problem);
+        start.point = point;
+        let sizes = start.field.sizes(&start.point.parameters);
+        let goal = MARGIN * tolerance;
+        if error <= goal {
+            return Ok(start);
+        }
+        if sizes.iter().all(|size| *size < LEAST) || error.is_nan() {
+            return Err(format!(
+                "the orbit cannot be lengthened until the error of its truncation, {error:.1e}, is below {goal:.1e}\n\
+                 likely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where the \
+                 equilibrium is clearly a saddle, or use a larger tolerance"
+            ));
+        }
+        // The error is of second order.
+        let share = (0.5 * goal / error).sqrt().clamp(0.05, 0.5);
+        start.point = lengthened(&start, share).ok_or("the equilibrium is not hyperbolic")?;
+        coarse = false;
+    }
+    Err("the truncation error does not decrease when the orbit is lengthened".into())
+}
+
+/// The orbit continued by the linear flow until its ends are closer to the equilibria by the factor `share`.
+fn lengthened(start: &Start, share: f64) -> Option<Point> {
+    const PIECES: usize = 6;
+    let (field, point, cycle) = (&start.field, &start.point, start.cycle()?);
+    let (n, parameters) = (field.dim(), &point.parameters);
+    let ends = [cycle.state(0.0), cycle.end()];
+    let ys = field.deviations([&ends[0], &ends[1]], parameters);
+    let splits = [field.split(0, parameters)?, field.split(1, parameters)?];
+    let mut times = [0.0; 2];
+    for (end, (time, side)) in times.iter_mut().zip([1.0, -1.0]).enumerate() {
+        let goal = share * splits[end].length(&ys[end], side);
+        let size = |t: f64| splits[end].length(&splits[end].flow(&ys[end], side, -side * t), side);
+        let (mut low, mut high) = (0.0, 1e-3 * cycle.period);
+        while size(high) > goal {
+            (low, high) = (high, 2.0 * high);
+            if high > 1e6 * cycle.period {
+                return None;
+            }
+        }
+        for _ in 0..40 {
+            let middle = 0.5 * (low + high);
+            *(if size(middle) > goal { &mut low } else { &mut high }) = middle;
+        }
+        *time = high;
+    }
+    let length = cycle.period;
+    let outer = |end: usize, t: f64| -> Vec<f64> {
+        let side = if end == 0 { 1.0 } else { -1.0 };
+        let y = splits[end].flow(&ys[end], side, t);
+        let moved = ends[end].iter().zip(&ys[end]).zip(&y).enumerate();
+        moved.map(|(c, ((x, y0), y))| x + field.scale(c) * (y - y0)).collect()
+    };
+    let scheme = Scheme::new(cycle.degree);
+    let piece = |end: usize| -> Vec<f64> {
+        (0..=PIECES).map(|k| times[end] * (k as f64 / PIECES as f64 - if end == 0 { 1.0 } else { 0.0 })).collect()
+    };
+    let [before, after] = [piece(0), piece(1)];
+    let mut profile = sampled(&before, &scheme, &|t| outer(0, t));
+    profile.extend_from_slice(&cycle.profile);
+    profile.extend(sampled(&after, &scheme, &|t| outer(1, t)));
+    let total = times[0] + length + times[1];
+    let all = before
+        .iter()
+        .map(|t| t + times[0])
+        .chain(cycle.mesh[1..].iter().map(|t| times[0] + t * length))
+        .chain(after[1..].iter().map(|t| times[0] + length + t));
+    let mut mesh: Vec<f64> = all.map(|t| t / total).collect();
+    (mesh[0], mesh[profile.len() / (n * (cycle.degree + 1))]) = (0.0, 1.0);
+    let sizes = field.sizes(parameters).map(|size| share * size);
+    let place = &parameters[field.place(0).start..field.place(1).end];
+    let moved = field.parameters(parameters, total, place, sizes, &field.gain(parameters));
+    let solution = Cycle { period: total, mesh: mesh.into(), profile, ..cycle.clone() };
+    Some(bare(&moved, Solution::Cycle(solution)))
+}

@@ -1,0 +1,460 @@
+//! Orbits that connect equilibria, as a boundary-value problem on a finite interval.
+//!
+//! **Idea.** A homoclinic orbit leaves a saddle along its unstable and returns along its stable manifold; a heteroclinic
+//! one ends at another saddle. It is cut off at a small distance from both, where the manifolds are replaced by their
+//! tangent spaces. The equilibria and the length of the interval are unknowns.
+//!
+//! **Equations.** On t ∈ [0, 1], with equilibria x_0 and x_1 (equal for a homoclinic orbit, but for whole turns g of
+//! angles), A_i = f_x(x_i, p), and projectors P_s, P_u of `splitting`:
+//!
+//! ```text
+//!   (1)  x' = T f(x, p)
+//!   (2)  f(x_i, p) = 0
+//!   (3)  Q_0 P_s(A_0) (x(0) - x_0) = 0             n_s rows
+//!   (4)  Q_1 P_u(A_1) (x(1) - x_1 - g) = 0         n_u rows
+//!   (5)  ⟨e_0, x(0) - x_0⟩ = 1,   ⟨e_1, x(1) - x_1 - g⟩ = 1
+//! ```
+//!
+//! Rows Q_i span those of the projectors at a reference solution. With its deviations y_i from the equilibria, and H of
+//! `splitting`, e_i = H y_i / (ε_i |y_i|): the orbit is cut off at the distance ε_i, where it crosses the plane (5)
+//! transversally. (5) fixes both T and the phase. The orbit exists if n_u(x_0) + n_s(x_1) = n, for isolated values of
+//! one parameter.
+//!
+//! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
+//! in this order: T, x_0, x_1 if it is another equilibrium, ε_0, ε_1, g, e_0, e_1, Q_0, Q_1.
+//!
+//! The tangent spaces deviate from the manifolds by terms of second order, r = ½ P D²f[y, y] / (rates). They are the
+//! remainders of (3) and (4), from which the error of the truncated orbit follows.
+//!
+//! **Source.** beyn1990 (truncation, projection conditions, order of the error); kuznetsov2004, §6.
+//!
+//! **Departures.** Two distances in place of a phase condition with a given length; projectors in place of bases of
+//! subspaces that are followed by Riccati equations.
+//!
+//! **Fails when** an eigenvalue of an equilibrium reaches the imaginary axis.
+
+mod splitting;
+#[cfg(test)]
+mod tests;
+
+use crate::contract::{Batch, Parameters, VectorField};
+use crate::linalg::{dot, max_abs};
+use crate::stability::eigenvalues;
+use num_complex::Complex64;
+use splitting::{flow, identity, metric, product, row_basis, sign, times};
+use std::ops::Range;
+
+/// A field on the states of a connecting orbit; see the module.
+pub struct ConnectingField<'a> {
+    field: &'a dyn VectorField,
+    /// `[n]` sizes of the states.
+    scales: Vec<f64>,
+    /// 1 for a homoclinic orbit, 2 for a heteroclinic one.
+    places: usize,
+    /// Dimension of the unstable subspace at the start.
+    unstable: usize,
+    determined: Vec<usize>,
+}
+
+/// An equilibrium, in units of the sizes of the states.
+struct Saddle {
+    f: Vec<f64>,
+    /// `[n × n]`, and `[n × q]` in the parameters asked for.
+    a: Vec<f64>,
+    fp: Vec<f64>,
+    state: Vec<f64>,
+}
+
+/// Stable and unstable parts at an equilibrium.
+pub struct Split {
+    /// A, its sign function S, and H, `[n × n]`, in units of the sizes of the states.
+    a: Vec<f64>,
+    s: Vec<f64>,
+    h: Vec<f64>,
+    n: usize,
+}
+
+impl Split {
+    /// Dimension of the unstable subspace.
+    pub fn unstable(&self) -> usize {
+        let trace: f64 = (0..self.n).map(|i| self.s[i * self.n + i]).sum();
+        ((self.n as f64 + trace) / 2.0).round() as usize
+    }
+
+    /// P_s (`side` -1) or P_u (`side` 1).
+    fn projector(&self, side: f64) -> Vec<f64> {
+        identity(self.n).iter().zip(&self.s).map(|(i, s)| 0.5 * (i + side * s)).collect()
+    }
+
+    /// |y| of the part of `y` `[n]` (in units of the sizes of the states) in the stable or the unstable subspace.
+    pub fn length(&self, y: &[f64], side: f64) -> f64 {
+        let part = times(&self.projector(side), y);
+        dot(&times(&self.h, &part), &part).max(0.0).sqrt()
+    }
+
+    /// The linear flow within the stable or unstable subspace from the part of `y` in it, at time `t`.
+    pub fn flow(&self, y: &[f64], side: f64, t: f64) -> Vec<f64> {
+        let p = self.projector(side);
+        flow(&product(&self.a, &p, self.n), t, &times(&p, y))
+    }
+}
+
+impl<'a> ConnectingField<'a> {
+    /// Orbits of `field` that leave an equilibrium with `unstable` unstable eigenvalues, and return to it or, with two
+    /// `places`, end at another one; `scales` `[n]` are the sizes of the states.
+    pub fn new(field: &'a dyn VectorField, scales: &[f64], places: usize, unstable: usize) -> ConnectingField<'a> {
+        let (n, k) = (field.dim(), field.parameter_count());
+        let determined = (k..k + 1 + places * n).collect();
+        ConnectingField { field, scales: scales.to_vec(), places, unstable, determined }
+    }
+
+    fn known(&self) -> usize {
+        self.field.parameter_count()
+    }
+
+    /// Range of the equilibrium at the start (`end` 0) or at the end (1) among the parameters.
+    pub fn place(&self, end: usize) -> Range<usize> {
+        let n = self.dim();
+        let first = self.known() + 1 + if self.places == 2 { end * n } else { 0 };
+        first..first + n
+    }
+
+    /// First of ε_0, ε_1, g, e_0, e_1, Q_0, Q_1.
+    fn hidden(&self) -> usize {
+        self.known() + 1 + self.places * self.dim()
+    }
+
+    /// All parameters, from those of the field, T, the equilibria, the distances ε and the turns g of angles. The
+    /// reference is missing.
+    pub fn parameters(&self, own: &[f64], length: f64, places: &[f64], sizes: [f64; 2], gain: &[f64]) -> Vec<f64> {
+        let mut all = [&own[..self.known()], &[length], places, &sizes].concat();
+        all.extend((0..self.dim()).map(|c| gain.get(c).copied().unwrap_or(0.0)));
+        all.resize(self.parameter_count(), 0.0);
+        all
+    }
+
+    /// Size of a state.
+    pub fn scale(&self, state: usize) -> f64 {
+        self.scales[state]
+    }
+
+    /// Turns g of angles.
+    pub fn gain(&self, parameters: &[f64]) -> Vec<f64> {
+        let first = self.hidden() + 2;
+        parameters[first..first + self.dim()].to_vec()
+    }
+
+    /// Distances ε at both ends.
+    pub fn sizes(&self, parameters: &[f64]) -> [f64; 2] {
+        let first = self.hidden();
+        [parameters[first], parameters[first + 1]]
+    }
+
+    /// Deviations y of both ends from the equilibria, in units of the sizes of the states.
+    pub fn deviations(&self, ends: [&[f64]; 2], parameters: &[f64]) -> [Vec<f64>; 2] {
+        let gain = &parameters[self.hidden() + 2..];
+        let off = |end: usize| -> Vec<f64> {
+            let place = &parameters[self.place(end)];
+            let turn = |c: usize| if end == 1 { gain[c] } else { 0.0 };
+            (0..self.dim()).map(|c| (ends[end][c] - place[c] - turn(c)) / self.scales[c]).collect()
+        };
+        [off(0), off(1)]
+    }
+
+    /// Stable and unstable parts at the equilibrium of an end; `None` next to a bifurcation of it.
+    pub fn split(&self, end: usize, parameters: &[f64]) -> Option<Split> {
+        let a = self.saddle(&parameters[self.place(end)], parameters, &[]).a;
+        let n = self.dim();
+        let (s, _) = sign(&a, &[], n)?;
+        let h = metric(&a, &s, n)?;
+        Some(Split { a, s, h, n })
+    }
+
+    fn saddle(&self, state: &[f64], parameters: &[f64], free: &[usize]) -> Saddle {
+        let (n, q) = (self.dim(), free.len());
+        let [mut f, mut fx, mut fp] = [1, n, q].map(|size| vec![0.0; n * size]);
+        let own = Parameters::Shared(&parameters[..self.known()]);
+        let batch = Batch { lanes: 1, states: state, parameters: own, times: &[], signs: &[] };
+        self.field.linearise(batch, free, &mut f, &mut fx, &mut fp);
+        f.iter_mut().zip(&self.scales).for_each(|(f, scale)| *f /= scale);
+        fx.iter_mut().enumerate().for_each(|(k, a)| *a *= self.scales[k % n] / self.scales[k / n]);
+        fp.iter_mut().enumerate().for_each(|(k, p)| *p /= self.scales[k / q]);
+        Saddle { f, a: fx, fp, state: state.to_vec() }
+    }
+
+    /// D²f[e_j, d] at a saddle for every state j, `[n × n]` in units of the sizes of the states: the derivative of A in
+    /// the direction `d` of states and parameters.
+    fn turned(&self, at: &Saddle, parameters: &[f64], d: &[f64]) -> Vec<f64> {
+        let (n, k) = (self.dim(), self.known());
+        let states: Vec<f64> = at.state.iter().flat_map(|x| vec![*x; n]).collect();
+        let mut units = vec![0.0; (n + k) * n];
+        (0..n).for_each(|j| units[j * n + j] = self.scales[j]);
+        let along: Vec<f64> = d.iter().flat_map(|x| vec![*x; n]).collect();
+        let mut out = vec![0.0; n * n];
+        let own = Parameters::Shared(&parameters[..k]);
+        let batch = Batch { lanes: n, states: &states, parameters: own, times: &[], signs: &[] };
+        self.field.directional(batch, &[&units, &along], &mut out);
+        out.iter_mut().enumerate().for_each(|(k, x)| *x /= self.scales[k / n]);
+        out
+    }
+
+    /// Ranges of Q_0 and Q_1 among the parameters.
+    fn row_ranges(&self) -> [Range<usize>; 2] {
+        let n = self.dim();
+        let first = self.hidden() + 2 + 3 * n;
+        let middle = first + (n - self.unstable) * n;
+        [first..middle, middle..first + n * n]
+    }
+
+    /// Range of e at an end.
+    fn plane(&self, end: usize) -> Range<usize> {
+        let first = self.hidden() + 2 + (1 + end) * self.dim();
+        first..first + self.dim()
+    }
+
+    fn base<'b>(&self, at: Batch<'b>) -> (Batch<'b>, Vec<f64>) {
+        let (k, lanes) = (self.known(), at.lanes);
+        let (parameters, lengths) = match at.parameters {
+            Parameters::Shared(all) => (Parameters::Shared(&all[..k]), vec![all[k]; lanes]),
+            Parameters::PerLane(all) => {
+                (Parameters::PerLane(&all[..k * lanes]), all[k * lanes..(k + 1) * lanes].to_vec())
+            }
+        };
+        (Batch { parameters, times: &[], ..at }, lengths)
+    }
+}
+
+impl VectorField for ConnectingField<'_> {
+    fn dim(&self) -> usize {
+        self.field.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        let n = self.dim();
+        self.hidden() + 2 + 3 * n + n * n
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        let (own, lengths) = self.base(at);
+        self.field.evaluate(own, f);
+        f.chunks_exact_mut(at.lanes).for_each(|f| f.iter_mut().zip(&lengths).for_each(|(f, t)| *f *= t));
+    }
+
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        let (own, lengths) = self.base(at);
+        let (k, n, q, lanes) = (self.known(), self.dim(), free.len(), at.lanes);
+        let known: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let mut each = vec![0.0; n * known.len() * lanes];
+        self.field.linearise(own, &known, f, fx, &mut each);
+        let stretched = |to: &mut [f64], from: &[f64]| {
+            to.iter_mut().zip(from).zip(&lengths).for_each(|((to, x), t)| *to = t * x);
+        };
+        fp.fill(0.0);
+        for (c, index) in free.iter().enumerate() {
+            let column = known.iter().position(|own| own == index);
+            for i in 0..n {
+                let to = &mut fp[(i * q + c) * lanes..][..lanes];
+                match column {
+                    Some(column) => stretched(to, &each[(i * known.len() + column) * lanes..][..lanes]),
+                    None if *index == k => to.copy_from_slice(&f[i * lanes..(i + 1) * lanes]),
+                    None => {}
+                }
+            }
+        }
+        let scale = |values: &mut [f64]| {
+            values.chunks_exact_mut(lanes).for_each(|v| v.iter_mut().zip(&lengths).for_each(|(v, t)| *v *= t));
+        };
+        scale(f);
+        scale(fx);
+    }
+
+    // T f is linear in T.
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
+        let (own, lengths) = self.base(at);
+        let (k, n, lanes) = (self.known(), self.dim(), at.lanes);
+        let short: Vec<&[f64]> = directions.iter().map(|d| &d[..(n + k) * lanes]).collect();
+        self.field.directional(own, &short, out);
+        out.chunks_exact_mut(lanes).for_each(|f| f.iter_mut().zip(&lengths).for_each(|(f, t)| *f *= t));
+        let mut rest = vec![0.0; n * lanes];
+        for (left, d) in directions.iter().enumerate() {
+            let change = &d[(n + k) * lanes..(n + k + 1) * lanes];
+            if change.iter().all(|t| *t == 0.0) {
+                continue;
+            }
+            let others: Vec<&[f64]> = short.iter().enumerate().filter(|(i, _)| *i != left).map(|(_, d)| *d).collect();
+            match others.is_empty() {
+                true => self.field.evaluate(own, &mut rest),
+                false => self.field.directional(own, &others, &mut rest),
+            }
+            for (out, rest) in out.chunks_exact_mut(lanes).zip(rest.chunks_exact(lanes)) {
+                out.iter_mut().zip(rest).zip(change).for_each(|((out, f), t)| *out += t * f);
+            }
+        }
+    }
+
+    fn ended(&self) -> bool {
+        self.field.ended()
+    }
+
+    fn forced(&self) -> bool {
+        true
+    }
+
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        parameters[self.known()]
+    }
+
+    fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
+        (0..parameters.len()).map(|k| if k == self.known() { 1.0 } else { 0.0 }).collect()
+    }
+
+    fn time_unit_along(&self, _parameters: &[f64], change: &[f64]) -> f64 {
+        change[self.known()]
+    }
+
+    fn periods(&self) -> &[f64] {
+        self.field.periods()
+    }
+
+    fn output_count(&self) -> usize {
+        self.field.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.field.outputs(self.base(at).0, out);
+    }
+
+    fn conditions(&self) -> [usize; 2] {
+        [(self.places + 1) * self.dim() + 2, 0]
+    }
+
+    fn determined(&self) -> &[usize] {
+        &self.determined
+    }
+
+    fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64], free: &[usize], to: [&mut [f64]; 4]) {
+        let [b, left, right, by] = to;
+        let (n, q, k) = (self.dim(), free.len(), self.known());
+        let known: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let column = |c: usize| known.iter().position(|own| *own == free[c]);
+        [&mut *left, &mut *right, &mut *by].into_iter().for_each(|values| values.fill(0.0));
+        let ys = self.deviations(ends, parameters);
+        let ranges = self.row_ranges();
+        let mut row = self.places * n;
+        for end in 0..2 {
+            let place = self.place(end);
+            let at = self.saddle(&parameters[place.clone()], parameters, &known);
+            // (2)
+            if end < self.places {
+                for i in 0..n {
+                    b[end * n + i] = at.f[i];
+                    for (c, index) in free.iter().enumerate() {
+                        by[(end * n + i) * q + c] = match column(c) {
+                            Some(own) => at.fp[i * known.len() + own],
+                            None if place.contains(index) => {
+                                let j = index - place.start;
+                                at.a[i * n + j] / self.scales[j]
+                            }
+                            None => 0.0,
+                        };
+                    }
+                }
+            }
+            // (3), (4)
+            let moves: Vec<usize> =
+                (0..q).filter(|c| column(*c).is_some() || place.contains(&free[*c])).collect();
+            let turns: Vec<Vec<f64>> = moves
+                .iter()
+                .map(|c| {
+                    let mut d = vec![0.0; n + k];
+                    match column(*c) {
+                        Some(_) => d[n + free[*c]] = 1.0,
+                        None => d[free[*c] - place.start] = 1.0,
+                    }
+                    self.turned(&at, parameters, &d)
+                })
+                .collect();
+            let Some((s, along)) = sign(&at.a, &turns, n) else {
+                b.fill(f64::NAN);
+                return;
+            };
+            // P_s at the start, P_u at the end.
+            let side = if end == 0 { -1.0 } else { 1.0 };
+            let rows = &parameters[ranges[end].clone()];
+            let projector: Vec<f64> = identity(n).iter().zip(&s).map(|(i, s)| 0.5 * (i + side * s)).collect();
+            let (own, y) = (product(rows, &projector, n), &ys[end]);
+            let varied: Vec<Vec<f64>> =
+                along.iter().map(|ds| times(rows, &times(ds, y)).iter().map(|x| 0.5 * side * x).collect()).collect();
+            let mut put = |values: &[f64], place: &Range<usize>, offset: f64, varied: &[f64]| {
+                let ends = if end == 0 { &mut *left } else { &mut *right };
+                b[row] = dot(values, y) - offset;
+                for j in 0..n {
+                    ends[row * n + j] = values[j] / self.scales[j];
+                }
+                for (c, index) in free.iter().enumerate() {
+                    if place.contains(index) {
+                        let j = index - place.start;
+                        by[row * q + c] = -values[j] / self.scales[j];
+                    }
+                }
+                moves.iter().zip(varied).for_each(|(c, v)| by[row * q + c] += v);
+                row += 1;
+            };
+            for (r, values) in own.chunks_exact(n).enumerate() {
+                let varied: Vec<f64> = varied.iter().map(|v| v[r]).collect();
+                put(values, &place, 0.0, &varied);
+            }
+            // (5)
+            put(&parameters[self.plane(end)], &place, 1.0, &[]);
+        }
+    }
+
+    fn refer(&self, ends: [&[f64]; 2], parameters: &mut [f64]) {
+        let ys = self.deviations(ends, parameters);
+        let (n, ranges, sizes) = (self.dim(), self.row_ranges(), self.sizes(parameters));
+        for (end, y) in ys.iter().enumerate() {
+            let Some(split) = self.split(end, parameters) else { return };
+            let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
+            let part = times(&split.projector(kept), y);
+            let along = times(&split.h, &part);
+            let length = dot(&along, &part).max(0.0).sqrt();
+            if !(length > 0.0 && max_abs(&along).is_finite()) {
+                return;
+            }
+            let plane = self.plane(end);
+            parameters[plane].iter_mut().zip(&along).for_each(|(e, h)| *e = h / (sizes[end] * length));
+            let rows = ranges[end].len() / n;
+            parameters[ranges[end].clone()].copy_from_slice(&row_basis(&split.projector(gone), rows, n));
+        }
+    }
+
+    fn remainders(&self, ends: [&[f64]; 2], parameters: &[f64]) -> Vec<f64> {
+        let (n, ranges) = (self.dim(), self.row_ranges());
+        let mut all = vec![0.0; self.places * n];
+        for (end, y) in self.deviations(ends, parameters).iter().enumerate() {
+            let Some(split) = self.split(end, parameters) else { return vec![f64::NAN; self.conditions()[0]] };
+            let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+            let along: Vec<f64> = (0..n).map(|c| y[c] * self.scales[c]).chain(vec![0.0; self.known()]).collect();
+            let second = times(&self.turned(&at, parameters, &along), y);
+            let values = eigenvalues(&at.a, n, &vec![1.0; n]);
+            let rate = |sign: f64| {
+                let own = values.iter().map(|z| sign * z.re).filter(|x| *x > 0.0);
+                own.fold(f64::INFINITY, f64::min)
+            };
+            let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
+            let rates = rate(gone) + 2.0 * rate(kept);
+            let own = product(&parameters[ranges[end].clone()], &split.projector(gone), n);
+            all.extend(times(&own, &second).iter().map(|r| 0.5 * r / rates));
+            all.push(0.0);
+        }
+        all
+    }
+
+    fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+        let of = |end: usize| {
+            let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+            eigenvalues(&at.a, self.dim(), &vec![1.0; self.dim()])
+        };
+        Some([of(0), of(1)])
+    }
+}

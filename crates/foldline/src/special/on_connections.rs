@@ -1,0 +1,134 @@
+//! Special points on curves of connecting orbits.
+//!
+//! **Idea.** Most bifurcations of codimension two depend on the leading eigenvalues: those closest to the imaginary axis
+//! on either side, at the equilibria where the orbit begins (unstable ones, λ_u) and ends (stable ones, λ_s).
+//!
+//! | kind | test function |
+//! |---|---|
+//! | neutral saddle | σ = Re λ_s + Re λ_u, the saddle quantity |
+//! | double eigenvalue | the discriminant (λ_1 - λ_2)² of the two leading eigenvalues of one side |
+//! | three leading eigenvalues | Re λ_1 - Re λ_3 of a leading pair and the next real one, or the other way round |
+//! | saddle-node homoclinic | the eigenvalue of smallest modulus |
+//! | Shilnikov–Hopf | the smallest real part of a pair |
+//! | orbit flip | ⟨p, x(T) - x_1⟩ of the leading left eigenvector p, at the end; likewise at the start |
+//!
+//! **Source.** champneys1996, §2 (list and test functions); kuznetsov2004, §6.4 (Shilnikov's condition).
+//!
+//! **Departures.** The discriminant in place of the difference of two real eigenvalues: it passes through zero.
+
+use crate::contract::{Monitor, Sight, VectorField};
+use crate::diagram::{Kind, Point};
+use num_complex::Complex64;
+
+/// Test function in one line of the table; `side` is 1 for the unstable eigenvalues at the start, -1 for the stable
+/// ones at the end.
+pub struct OnConnection<'a> {
+    field: &'a dyn VectorField,
+    kind: Kind,
+    side: f64,
+}
+
+/// Monitors for a curve of connecting orbits.
+pub fn monitors<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
+    let both = [Kind::DoubleEigenvalue, Kind::ThreeLeading, Kind::NonCentral, Kind::ShilnikovHopf];
+    let own = |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side }) as Box<dyn Monitor + 'a>;
+    let sides = both.into_iter().flat_map(|kind| [own(kind, 1.0), own(kind, -1.0)]);
+    std::iter::once(own(Kind::NeutralSaddle, 1.0)).chain(sides).collect()
+}
+
+/// Eigenvalues of one side of the imaginary axis by their distance from it, as positive real parts.
+pub fn of_side(values: &[Complex64], side: f64) -> Vec<Complex64> {
+    let mut own: Vec<Complex64> = values.iter().filter(|z| side * z.re > 0.0).map(|z| side * z).collect();
+    own.sort_by(|a, b| a.re.total_cmp(&b.re));
+    own
+}
+
+/// σ of a connecting orbit: Re λ_s at its end plus Re λ_u at its start.
+pub fn saddle_quantity(field: &dyn VectorField, at: &Point) -> Option<f64> {
+    let [start, end] = field.saddles(&at.parameters)?;
+    Some(of_side(&start, 1.0).first()?.re - of_side(&end, -1.0).first()?.re)
+}
+
+/// Group of eigenvalues with one real part: 1 if it is real, 2 if it is a pair.
+fn group(values: &[Complex64]) -> usize {
+    if values.first().is_some_and(|z| z.im != 0.0) { 2 } else { 1 }
+}
+
+impl OnConnection<'_> {
+    /// Eigenvalues of the side, at its end of the orbit.
+    fn own(&self, at: &Point) -> Option<Vec<Complex64>> {
+        let [start, end] = self.field.saddles(&at.parameters)?;
+        Some(of_side(if self.side > 0.0 { &start } else { &end }, self.side))
+    }
+
+    fn tested(&self, at: &Point) -> Option<f64> {
+        let own = self.own(at)?;
+        match self.kind {
+            Kind::NeutralSaddle => saddle_quantity(self.field, at),
+            Kind::DoubleEigenvalue => {
+                let gap = own.get(1)? - own.first()?;
+                Some((gap * gap).re)
+            }
+            Kind::ThreeLeading => {
+                // Positive if a real one leads a pair.
+                let first = group(&own);
+                let next = own.get(first..)?;
+                let gap = next.first()?.re - own.first()?.re;
+                match (first, group(next)) {
+                    (1, 2) => Some(gap),
+                    (2, 1) => Some(-gap),
+                    _ => None,
+                }
+            }
+            Kind::NonCentral => own.iter().filter(|z| z.im == 0.0).map(|z| z.re).reduce(f64::min),
+            Kind::ShilnikovHopf => own.iter().filter(|z| z.im != 0.0).map(|z| z.re).reduce(f64::min),
+            _ => None,
+        }
+    }
+}
+
+impl Monitor for OnConnection<'_> {
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        self.tested(at).unwrap_or(f64::NAN)
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        // Test functions jump where the leading eigenvalues become others.
+        const NEAR: f64 = 1e-4;
+        let Some((own, value)) = self.own(at).zip(self.tested(at)) else { return false };
+        let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+        value.abs() < NEAR * size * if self.kind == Kind::DoubleEigenvalue { size } else { 1.0 }
+    }
+
+    fn reads(&self) -> Sight {
+        Sight::Tangent
+    }
+
+    fn label(&self) -> usize {
+        usize::from(self.side < 0.0)
+    }
+
+    fn jump(&self) -> usize {
+        0
+    }
+
+    fn remark(&self, at: &Point, _forwards: bool) -> String {
+        let Some([start, end]) = self.field.saddles(&at.parameters) else { return String::new() };
+        let kinds = [of_side(&start, 1.0), of_side(&end, -1.0)].map(|own| group(&own));
+        let side = if self.side > 0.0 { "unstable" } else { "stable" };
+        match (self.kind, kinds) {
+            (Kind::NeutralSaddle, [1, 1]) => "neutral saddle".into(),
+            (Kind::NeutralSaddle, [2, 2]) => "neutral bi-focus".into(),
+            (Kind::NeutralSaddle, _) => "neutral saddle-focus (Belyakov)".into(),
+            (Kind::DoubleEigenvalue, _) => format!("of the {side} eigenvalues: from saddle to saddle-focus (Belyakov)"),
+            (Kind::ThreeLeading, _) => format!("of the {side} eigenvalues"),
+            _ => String::new(),
+        }
+    }
+
+}
+
