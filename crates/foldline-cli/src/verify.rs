@@ -29,7 +29,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if typed.format == Format::Text {
         summary(&verified, wrong, &mut stdout().lock())?;
     }
-    Ok(if wrong > 0 { Outcome::Wrong } else { Outcome::Done })
+    let nothing = verified.checks.is_empty() && !verified.undecided.is_empty();
+    if nothing {
+        let _ = writeln!(std::io::stderr(), "error: nothing could be verified: every check is undecided");
+    }
+    Ok(match (wrong, nothing) {
+        (1.., _) => Outcome::Wrong,
+        (0, true) => Outcome::Short,
+        (0, false) => Outcome::Done,
+    })
 }
 
 fn listed(checks: &[&Check]) -> Table {

@@ -1,6 +1,7 @@
 //! Columns of the tables.
 
 use super::{Cell, Column, Style, Table};
+use foldline::special::on_connections;
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown, Solution};
 use foldline::model::Model;
@@ -83,6 +84,8 @@ pub fn points(
     columns.extend(sizes.map(|name| column(name, Style::Size)));
     columns.extend(WORK.map(|name| column(name, Style::Number)));
     columns.push(column("multipliers", Style::Word));
+    let connecting = diagram.branches.iter().any(|b| kept(b) && b.is_connecting());
+    columns.extend(connecting.then(|| column("saddle_quantity", Style::Number)));
     let others = contacts.columns.len();
     columns.extend(contacts.columns.iter().map(|(name, style)| column(name, *style)));
     let row = |branch: &Branch, point: &Point| {
@@ -103,8 +106,12 @@ pub fn points(
         row.extend(sizes.map(Cell::Number));
         row.extend(work(point.cost).map(count));
         // A boundary-value problem has no multipliers.
-        let spectrum = if branch.family == Family::Arc { Vec::new() } else { point.spectrum.clone() };
-        row.push(Cell::Spectrum(spectrum));
+        let hidden = branch.family == Family::Arc && !branch.is_connecting();
+        row.push(Cell::Spectrum(if hidden { Vec::new() } else { point.spectrum.clone() }));
+        if connecting {
+            let sigma = if branch.is_connecting() { on_connections::quantity_of(&point.spectrum) } else { None };
+            row.push(sigma.map_or(Cell::Empty, Cell::Number));
+        }
         match contacts.cells.get(&(branch.name.clone(), point.position)) {
             Some(found) => row.extend(found.iter().map(Known::cell)),
             None => row.extend((0..others).map(|_| Cell::Empty)),

@@ -898,6 +898,12 @@ impl Branch {
         self.held.map(|(_, first)| [first, self.free])
     }
 
+    /// True for a curve of orbits that connect equilibria; the spectra of its points are the eigenvalues at the
+    /// equilibrium where the orbit begins.
+    pub fn is_connecting(&self) -> bool {
+        matches!(self.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)))
+    }
+
     /// Inserts an accepted point at its position.
     pub fn insert(&mut self, point: Point) {
         let at = self.points.partition_point(|p| p.position < point.position);

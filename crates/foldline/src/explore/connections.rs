@@ -149,11 +149,9 @@ fn unstable(system: &System, x: &[f64], parameters: &[f64]) -> Option<usize> {
 /// The field of a stored orbit.
 fn revived<'s>(system: &'s System, curve: &CurvePlan, point: &Point) -> Result<Start<'s>, String> {
     let places = if curve.hold == Kind::Heteroclinic { 2 } else { 1 };
-    let field = ConnectingField::new(system.field, &system.scales, places, 0);
-    let place = point.parameters.get(field.place(0)).unwrap_or_default().to_vec();
-    let count = unstable(system, &place, &point.parameters)
-        .ok_or_else(|| "the equilibrium of the stored orbit is not hyperbolic".to_string())?;
-    Ok(Start { field: ConnectingField::new(system.field, &system.scales, places, count), point: point.clone() })
+    let field = ConnectingField::of_stored(system.field, &system.scales, places, &point.parameters);
+    let field = field.ok_or_else(|| "the stored orbit does not belong to a saddle of this model".to_string())?;
+    Ok(Start { field, point: point.clone() })
 }
 
 /// The homoclinic orbit that the cycles at an end of a branch approach, at the values that the last cycle has of all
@@ -436,23 +434,7 @@ fn lengthened(start: &Start, share: f64) -> Option<Point> {
     let ends = [cycle.state(0.0), cycle.end()];
     let ys = field.deviations([&ends[0], &ends[1]], parameters);
     let splits = [field.split(0, parameters)?, field.split(1, parameters)?];
-    let mut times = [0.0; 2];
-    for (end, (time, side)) in times.iter_mut().zip([1.0, -1.0]).enumerate() {
-        let goal = share * splits[end].length(&ys[end], side);
-        let size = |t: f64| splits[end].length(&splits[end].flow(&ys[end], side, -side * t), side);
-        let (mut low, mut high) = (0.0, 1e-3 * cycle.period);
-        while size(high) > goal {
-            (low, high) = (high, 2.0 * high);
-            if high > 1e6 * cycle.period {
-                return None;
-            }
-        }
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            *(if size(middle) > goal { &mut low } else { &mut high }) = middle;
-        }
-        *time = high;
-    }
+    let times = [splits[0].time_to(&ys[0], 1.0, share)?, splits[1].time_to(&ys[1], -1.0, share)?];
     let length = cycle.period;
     let outer = |end: usize, t: f64| -> Vec<f64> {
         let side = if end == 0 { 1.0 } else { -1.0 };

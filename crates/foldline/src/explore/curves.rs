@@ -8,7 +8,7 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use crate::continuation::{Settings, UNCROSSED};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Ending, Origin, Point, Shown, SpecialPoint};
+use crate::diagram::{Branch, Ending, Kind, Origin, Point, Shown, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::unfolded::{Unfolded, sizes};
 
@@ -140,6 +140,13 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     let (ending, point) =
         if backward { (&branch.ends[0], branch.points.first()) } else { (&branch.ends[1], branch.points.last()) };
     let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
+    if matches!(curve.hold, Kind::Homoclinic | Kind::Heteroclinic) {
+        return Err(format!(
+            "no branch starts from connecting orbits\nlikely cause: {} is a curve of them, and an orbit exists for isolated \
+             values of the branch's parameter only\nwhat to do: start from cycles or equilibria",
+            curve.name
+        ));
+    }
     match (ending, point) {
         (Some(Ending::Bound(_)), Some(point)) if arrived(point.parameters[curve.free]) => {
             let first = branch.held.map_or(curve.free, |(_, first)| first);

@@ -49,6 +49,11 @@ pub fn saddle_quantity(field: &dyn VectorField, at: &Point) -> Option<f64> {
     Some(of_side(&start, 1.0).first()?.re - of_side(&end, -1.0).first()?.re)
 }
 
+/// Saddle quantity of a homoclinic orbit from the eigenvalues of its saddle.
+pub fn quantity_of(values: &[Complex64]) -> Option<f64> {
+    Some(of_side(values, 1.0).first()?.re - of_side(values, -1.0).first()?.re)
+}
+
 /// Group of eigenvalues with one real part: 1 if it is real, 2 if it is a pair.
 fn group(values: &[Complex64]) -> usize {
     if values.first().is_some_and(|z| z.im != 0.0) { 2 } else { 1 }

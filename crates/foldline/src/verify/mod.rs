@@ -17,6 +17,7 @@
 //! **Fails when** the integration itself is not accurate enough: stiff equations, or a discontinuous right-hand side.
 //! Undecided cases are counted and reported as such, not as passed.
 
+mod arcs;
 mod maps;
 mod points;
 mod record;
@@ -177,16 +178,9 @@ pub fn verify(
         let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
-        if system.is_open() {
-            let why = "solutions of boundary-value problems are not recomputed yet";
-            let undecided = |position: i64, special: Option<Kind>| Undecided {
-                branch: branch.name.clone(),
-                position,
-                special,
-                why,
-            };
-            out.undecided.extend(chosen.iter().map(|i| undecided(branch.points[*i].position, None)));
-            out.undecided.extend(branch.special.iter().map(|own| undecided(own.point.position, Some(own.kind))));
+        let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
+        if system.is_open() || connecting {
+            out.add(arcs::verify(system, branch, &chosen, accuracies(tolerance)[0]));
             continue;
         }
         let setting = setting(system, branch);

@@ -92,6 +92,36 @@ impl Split {
         dot(&times(&self.h, &part), &part).max(0.0).sqrt()
     }
 
+    /// The part of `y` `[n]` in the stable or the unstable subspace.
+    pub fn part(&self, y: &[f64], side: f64) -> Vec<f64> {
+        times(&self.projector(side), y)
+    }
+
+    /// Time in which the linear flow brings the stable or unstable part of `y`, backwards for the unstable one, closer to
+    /// the equilibrium by the factor `share`.
+    pub fn time_to(&self, y: &[f64], side: f64, share: f64) -> Option<f64> {
+        const DOUBLINGS: usize = 200;
+        const HALVINGS: usize = 50;
+        let goal = share * self.length(y, side);
+        let size = |t: f64| self.length(&self.flow(y, side, -side * t), side);
+        let rate = self.a.iter().fold(f64::MIN_POSITIVE, |m: f64, a| m.max(a.abs()));
+        let (mut low, mut high) = (0.0, 0.01 / rate);
+        for _ in 0..DOUBLINGS {
+            if size(high) <= goal {
+                break;
+            }
+            (low, high) = (high, 1.5 * high);
+        }
+        if !(size(high) <= goal) {
+            return None;
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            *(if size(middle) > goal { &mut low } else { &mut high }) = middle;
+        }
+        Some(high)
+    }
+
     /// The linear flow within the stable or unstable subspace from the part of `y` in it, at time `t`.
     pub fn flow(&self, y: &[f64], side: f64, t: f64) -> Vec<f64> {
         let p = self.projector(side);
@@ -106,6 +136,21 @@ impl<'a> ConnectingField<'a> {
         let (n, k) = (field.dim(), field.parameter_count());
         let determined = (k..k + 1 + places * n).collect();
         ConnectingField { field, scales: scales.to_vec(), places, unstable, determined }
+    }
+
+    /// The field of a stored orbit with these parameters; `None` if its equilibrium is not hyperbolic.
+    pub fn of_stored(
+        field: &'a dyn VectorField,
+        scales: &[f64],
+        places: usize,
+        parameters: &[f64],
+    ) -> Option<ConnectingField<'a>> {
+        let own = ConnectingField::new(field, scales, places, 0);
+        if parameters.len() != own.parameter_count() {
+            return None;
+        }
+        let unstable = own.split(0, parameters)?.unstable();
+        Some(ConnectingField { unstable, ..own })
     }
 
     fn known(&self) -> usize {
