@@ -13,6 +13,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
+use crate::special::on_connections;
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
@@ -674,6 +675,12 @@ impl Growth<'_> {
             return Ending::Stopped;
         }
         match ending {
+            Ending::StepTooSmall(why) if branch.is_connecting() => {
+                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why))
+            }
+            Ending::GivenUp(why) if branch.is_connecting() => {
+                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
+            }
             Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, &latest.borrow(), why)),
             other => other,
         }
@@ -792,7 +799,9 @@ impl Growth<'_> {
                 special::map_form::coefficients(special.kind, &own, &at, special.error)
             }
             // Normal forms of boundary-value problems are not computed.
-            Solution::Cycle(_) if system.is_open() => Coefficients::default(),
+            Solution::Cycle(_) if system.is_open() => {
+                Coefficients { remark: special.remark.clone(), ..Coefficients::default() }
+            }
             Solution::Cycle(_) => special::cycle_coefficients::coefficients(special.kind, &own, &special.point),
         }
     }

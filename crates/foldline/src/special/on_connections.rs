@@ -54,6 +54,34 @@ pub fn quantity_of(values: &[Complex64]) -> Option<f64> {
     Some(of_side(values, 1.0).first()?.re - of_side(values, -1.0).first()?.re)
 }
 
+/// Text of an ending on a curve of connecting orbits, with the likely cause if an eigenvalue at `at` is close to the
+/// imaginary axis.
+pub fn at_bifurcation(at: &Point, why: String) -> String {
+    /// Ratio of the smallest to the largest distance from the axis. A factor of safety: the steps shorten as it
+    /// decreases.
+    const NEAR: f64 = 0.05;
+    let sizes = at.spectrum.iter().map(|z| z.re.abs());
+    let largest = sizes.fold(0.0, f64::max);
+    let close = at.spectrum.iter().min_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
+    let Some(z) = close.filter(|z| z.re.abs() < NEAR * largest) else { return why };
+    let first = why.lines().next().unwrap_or_default();
+    let (value, what, cure) = match z.im == 0.0 {
+        true => (
+            format!("the eigenvalue {:.2e}", z.re),
+            "the curve ends at an orbit homoclinic to a saddle-node",
+            "follow the fold of the equilibria, on which such orbits lie",
+        ),
+        false => (
+            format!("the pair of eigenvalues {:.2e} ± {:.2e} i", z.re, z.im.abs()),
+            "the curve ends where the equilibrium has a Hopf bifurcation",
+            "follow the Hopf points of the equilibria",
+        ),
+    };
+    format!(
+        "{first}\nlikely cause: {value} of the equilibrium is close to the imaginary axis; {what}\nwhat to do: {cure}"
+    )
+}
+
 /// Group of eigenvalues with one real part: 1 if it is real, 2 if it is a pair.
 fn group(values: &[Complex64]) -> usize {
     if values.first().is_some_and(|z| z.im != 0.0) { 2 } else { 1 }
