@@ -166,3 +166,32 @@ fn branches_without_a_homoclinic_orbit_are_refused_with_the_reason() {
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output).contains("limit of cycles"), "{}", text(&output));
 }
+
+/// A particle in a well between two saddles, (±1, 0), with a damping that changes sign with its deflection. For eps -> 0
+/// the orbit from one saddle to the other exists at nu = 1/5 (Melnikov: the mean of tanh² over sech⁴).
+const WELL: &str = "[parameters]\nnu = -0.1\neps = 0.1\n[states]\nx = { equation = \"v\", range = [-0.9, 0.9] }\n\
+                    v = { equation = \"-x + x^3 + eps*(nu - x^2)*v\", range = [-0.9, 0.9] }\n";
+
+#[test]
+fn a_heteroclinic_orbit_between_two_saddles_has_the_place_of_its_limit() {
+    let (folder, _) = desk(
+        "lorenz",
+        &study("state = { x = 0, v = 0 }", ["nu", "[-0.2, 0.5]"], ["eps", "[0.02, 0.3]"], "0.05, 0.1")
+            .replace("\"homoclinic\"", "\"heteroclinic\""),
+    );
+    std::fs::write(folder.path().join("m.toml"), WELL).unwrap();
+    let (diagram, _) = run(folder.path(), 0);
+    let curve = diagram.branch("orbits").unwrap();
+    complete(curve);
+    let at = |eps: f64| {
+        let marks = || curve.special.iter().filter(|s| s.kind == Kind::Mark);
+        let found = marks().find(|s| (s.point.parameters[1] - eps).abs() < 1e-9).unwrap();
+        found.point.parameters[0] - 0.2
+    };
+    // The next term is of second order.
+    assert!(at(0.05).abs() < 0.05 * 0.05 && at(0.1).abs() < 0.1 * 0.1, "{} {}", at(0.05), at(0.1));
+    let start = &curve.points[0];
+    assert_eq!(start.spectrum.iter().filter(|z| z.re > 0.0).count(), 1);
+    let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}

@@ -23,7 +23,7 @@ pub(super) const KEYS: [&str; 12] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 8] = [
+const HELD: [Kind; 9] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -32,6 +32,7 @@ const HELD: [Kind; 8] = [
     Kind::Grazing,
     Kind::BoundaryEquilibrium,
     Kind::Homoclinic,
+    Kind::Heteroclinic,
 ];
 
 /// Branch on which the special point lies.
@@ -104,7 +105,7 @@ pub(super) fn read(
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus | Kind::Grazing => Some(Family::Cycle),
-        Kind::Homoclinic => Some(Family::Arc),
+        Kind::Homoclinic | Kind::Heteroclinic => Some(Family::Arc),
         Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
     };
@@ -202,9 +203,10 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }
-        (Kind::Homoclinic, Some(Family::Equilibrium)) => {
-            Some(("a homoclinic orbit is the limit of cycles, not of equilibria", "homoclinic, `of` a branch of cycles"))
-        }
+        (Kind::Homoclinic | Kind::Heteroclinic, Some(Family::Equilibrium)) => Some((
+            "a connecting orbit is the limit of cycles, not of equilibria",
+            "homoclinic or heteroclinic, `of` a branch of cycles",
+        )),
         (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
             "equilibria have only folds, branch points and Hopf points",
             "fold, branch-point or hopf, or a branch of cycles",

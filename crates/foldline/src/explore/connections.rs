@@ -206,23 +206,23 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
     }
 }
 
-/// Point of a cycle between two others: its state, its distance from the equilibrium, and the speed.
-fn slowest(system: &System, cycle: &Cycle, parameters: &[f64]) -> (f64, Vec<f64>) {
+/// Normalised times and states at which a cycle is slower than just before and after, by time from its slowest point on.
+fn slow_points(system: &System, cycle: &Cycle, parameters: &[f64]) -> Vec<(f64, Vec<f64>)> {
     let n = system.field.dim();
-    let mut best = (f64::INFINITY, 0.0, vec![0.0; n]);
-    for pair in cycle.mesh.windows(2) {
-        for t in [pair[0], 0.5 * (pair[0] + pair[1])] {
-            let x = cycle.state(t);
-            let mut f = vec![0.0; n];
-            let at = Parameters::Shared(parameters);
-            system.field.evaluate(Batch { lanes: 1, states: &x, parameters: at, times: &[], signs: &[] }, &mut f);
-            let speed = system.norm(&f);
-            if speed < best.0 {
-                best = (speed, t, x);
-            }
-        }
-    }
-    (best.1, best.2)
+    let times: Vec<f64> = cycle.mesh.windows(2).flat_map(|pair| [pair[0], 0.5 * (pair[0] + pair[1])]).collect();
+    let speed = |t: &f64| {
+        let (x, mut f) = (cycle.state(*t), vec![0.0; n]);
+        let at = Parameters::Shared(parameters);
+        system.field.evaluate(Batch { lanes: 1, states: &x, parameters: at, times: &[], signs: &[] }, &mut f);
+        system.norm(&f)
+    };
+    let speeds: Vec<f64> = times.iter().map(speed).collect();
+    let count = times.len();
+    let lowest = (0..count).min_by(|a, b| speeds[*a].total_cmp(&speeds[*b])).unwrap_or(0);
+    let along = (0..count).map(|k| (lowest + k) % count);
+    let low = along.filter(|k| speeds[*k] <= speeds[(k + 1) % count] && speeds[*k] <= speeds[(k + count - 1) % count]);
+    let later = |t: f64| if t < times[lowest] { t + 1.0 } else { t };
+    low.map(|k| (later(times[k]), cycle.state(later(times[k])))).collect()
 }
 
 /// The equilibrium to which Newton's method leads from `x`.
@@ -244,8 +244,8 @@ fn equilibrium(system: &System, x: &[f64], parameters: &[f64]) -> Option<Vec<f64
     None
 }
 
-/// The homoclinic orbit near a cycle of long period, from the piece of the cycle between its departure from the
-/// equilibrium and its return.
+/// The connecting orbit near a cycle of long period, from the piece of the cycle between its departure from a saddle and
+/// its return to that or, `between_two`, its arrival at the next one.
 fn cut<'s>(
     system: &'s System,
     plan: &Plan,
@@ -255,29 +255,58 @@ fn cut<'s>(
     between_two: bool,
 ) -> Result<Start<'s>, String> {
     let Solution::Cycle(cycle) = &point.solution else {
-        return Err("the branch consists of equilibria; a homoclinic orbit needs a branch of cycles".into());
+        return Err("the branch consists of equilibria; a connecting orbit needs a branch of cycles".into());
     };
-    if between_two {
-        return Err(
-            "heteroclinic orbits are not started from cycles yet\nwhat to do: give both equilibria and a profile".into()
-        );
+    let (n, slow) = (system.field.dim(), slow_points(system, cycle, &point.parameters));
+    let Some((begin, place)) = slow.first().and_then(|(t, x)| Some((*t, equilibrium(system, x, &point.parameters)?)))
+    else {
+        return Err("Newton's method finds no equilibrium next to the slowest point of the last cycle".into());
+    };
+    let differs = |x: &[f64]| {
+        const SAME: f64 = 1e-3;
+        let off: Vec<f64> = x.iter().zip(&place).map(|(a, b)| a - b).collect();
+        system.norm(&off) > SAME
+    };
+    let near = |x: &[f64], y: &[f64]| {
+        const NEAR: f64 = 0.2;
+        (0..n).all(|c| {
+            let [low, high] = point.ranges.get(c).copied().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            (x[c] - y[c]).abs() <= NEAR * (high - low)
+        })
+    };
+    let other = slow.iter().skip(1).filter(|_| between_two).find_map(|(t, x)| {
+        let found = equilibrium(system, x, &point.parameters)?;
+        (differs(&found) && near(x, &found)).then_some((*t, found))
+    });
+    if between_two && other.is_none() {
+        return Err(format!(
+            "the last cycle is close to one equilibrium only\nlikely cause: it approaches a homoclinic orbit\nwhat to do: use \
+             `hold = \"{}\"`",
+            Kind::Homoclinic
+        ));
     }
-    let (slow, x) = slowest(system, cycle, &point.parameters);
-    let place = equilibrium(system, &x, &point.parameters)
-        .ok_or_else(|| "Newton's method finds no equilibrium next to the slowest point of the last cycle".to_string())?;
-    let count = unstable(system, &place, &point.parameters).filter(|count| (1..x.len()).contains(count));
-    let count = count.ok_or_else(|| {
-        let state: Vec<String> = place.iter().map(|x| format!("{:.6}", Shown(*x))).collect();
-        format!(
-            "the equilibrium ({}) next to the slowest point of the last cycle is not a saddle",
-            state.join(", ")
-        )
-    })?;
-    let field = ConnectingField::new(system.field, &system.scales, 1, count);
-    let probe = field.parameters(&point.parameters, 1.0, &place, [1.0; 2], &cycle.gain);
-    let split = field.split(0, &probe).ok_or("the equilibrium is not hyperbolic")?;
-    let sides = Departure { field: &field, split: &split, probe: &probe, cycle, slow };
-    let (from, to, size) = sides.piece().ok_or_else(|| {
+    let until = other.as_ref().map_or(begin + 1.0, |(t, _)| *t);
+    let places = [&place[..], other.as_ref().map_or(&[], |(_, x)| &x[..])].concat();
+    let count = unstable(system, &place, &point.parameters).filter(|count| (1..n).contains(count));
+    let counts = [count, other.as_ref().map_or(count, |(_, x)| unstable(system, x, &point.parameters))];
+    let [Some(count), Some(count_there)] = counts else {
+        let state: Vec<String> = places.iter().map(|x| format!("{:.6}", Shown(*x))).collect();
+        return Err(format!("an equilibrium next to the slowest points of the last cycle is not a saddle ({})", state.join(", ")));
+    };
+    if count != count_there {
+        return Err(format!(
+            "the saddles have {count} and {count_there} unstable eigenvalues\nlikely cause: orbits from one to the other exist \
+             for all parameter values, or need more than one parameter\nwhat to do: only orbits between saddles with as \
+             many unstable eigenvalues are followed"
+        ));
+    }
+    let field = ConnectingField::new(system.field, &system.scales, if between_two { 2 } else { 1 }, count);
+    let gain: &[f64] = if between_two { &[] } else { &cycle.gain };
+    let probe = field.parameters(&point.parameters, 1.0, &places, [1.0; 2], gain);
+    let splits = [0, 1].map(|end| field.split(end, &probe));
+    let [Some(left), Some(right)] = &splits else { return Err("an equilibrium is not hyperbolic".into()) };
+    let sides = Departure { field: &field, splits: [left, right], probe: &probe, cycle, times: [begin, until] };
+    let (from, to, sizes) = sides.piece().ok_or_else(|| {
         "the last cycle does not come close enough to the equilibrium\nlikely cause: its period is not long yet\nwhat to \
          do: follow the branch of cycles further, with more `max-points`"
             .to_string()
@@ -291,15 +320,16 @@ fn cut<'s>(
     mesh.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
     let profile = sampled(&mesh, &scheme, &|t| cycle.state(t));
     let mesh: Vec<f64> = mesh.iter().map(|t| (t - from) / (to - from)).collect();
-    let parameters = field.parameters(&point.parameters, length, &place, [size; 2], &cycle.gain);
+    let parameters = field.parameters(&point.parameters, length, &places, sizes, gain);
     let solution = Cycle {
         period: length,
         forcing_periods: 1,
         mesh: mesh.into(),
         degree: plan.degree,
         profile,
-        gain: vec![0.0; x.len()],
+        gain: vec![0.0; n],
     };
+    drop(splits);
     settled(system, plan, curve, first, Start { field, point: bare(&parameters, Solution::Cycle(solution)) })
 }
 
@@ -309,45 +339,42 @@ fn sampled(mesh: &[f64], scheme: &Scheme, state: &dyn Fn(f64) -> Vec<f64>) -> Ve
     nodes.flat_map(state).collect()
 }
 
-/// A cycle next to a saddle.
+/// A cycle between the saddle that it leaves and the one that it arrives at.
 struct Departure<'d> {
     field: &'d ConnectingField<'d>,
-    split: &'d Split,
+    splits: [&'d Split; 2],
     probe: &'d [f64],
     cycle: &'d Cycle,
-    /// Time in periods at which the cycle is slowest.
-    slow: f64,
+    /// Times in periods at which the cycle is slowest next to both.
+    times: [f64; 2],
 }
 
 impl Departure<'_> {
-    /// Lengths of the stable and unstable parts of the deviation from the saddle at a time in periods, counted from that
-    /// at which the cycle is slowest, where it leaves; on return, after a period.
-    fn parts(&self, t: f64) -> [f64; 2] {
-        let x = self.cycle.state(self.slow + t);
-        let end = usize::from(t > 0.5);
-        let [leaving, returning] = self.field.deviations([&x, &x], self.probe);
-        let y = if end == 0 { leaving } else { returning };
-        [self.split.length(&y, -1.0), self.split.length(&y, 1.0)]
+    /// Lengths of the stable and unstable parts of the deviations from both saddles at a time in periods.
+    fn parts(&self, t: f64) -> [[f64; 2]; 2] {
+        let x = self.cycle.state(t);
+        let ys = self.field.deviations([&x, &x], self.probe);
+        [0, 1].map(|end| [-1.0, 1.0].map(|side| self.splits[end].length(&ys[end], side)))
     }
 
-    /// Times, in periods, at which the cycle leaves and re-enters a neighbourhood of the saddle, and the size of that: a
-    /// tenth of the largest distance, or less if the linear flow determines the orbit better there.
-    fn piece(&self) -> Option<(f64, f64, f64)> {
+    /// Times, in periods, at which the cycle leaves the neighbourhood of one saddle and enters that of the other, and
+    /// the sizes of these: a share of the largest distance, or more if the cycle is not that close.
+    fn piece(&self) -> Option<(f64, f64, [f64; 2])> {
         const SAMPLES: usize = 4000;
         const SHARE: f64 = 0.05;
-        let all: Vec<[f64; 2]> = (0..=SAMPLES).map(|k| self.parts(k as f64 / SAMPLES as f64)).collect();
-        let far = all.iter().map(|[s, u]| s.hypot(*u)).fold(0.0, f64::max);
-        let near = all.iter().map(|[s, u]| s.hypot(*u)).fold(f64::INFINITY, f64::min);
-        let size = (SHARE * far).max(3.0 * near);
-        if size > 0.5 * far {
-            return None;
-        }
+        let time = |k: usize| self.times[0] + (self.times[1] - self.times[0]) * k as f64 / SAMPLES as f64;
+        let all: Vec<[[f64; 2]; 2]> = (0..=SAMPLES).map(|k| self.parts(time(k))).collect();
         let half = SAMPLES / 2;
-        let from = (0..half).find(|k| all[*k][1] >= size)?;
-        let to = (half..=SAMPLES).rev().find(|k| all[*k][0] >= size)?;
-        // The slowest point may lie on either side of the closest one.
-        let step = 1.0 / SAMPLES as f64;
-        Some((self.slow + from as f64 * step, self.slow + to as f64 * step, size))
+        let size = |end: usize| {
+            let lengths = || all.iter().map(move |own| own[end][0].hypot(own[end][1]));
+            let (far, near) = (lengths().fold(0.0, f64::max), lengths().fold(f64::INFINITY, f64::min));
+            let size = (SHARE * far).max(3.0 * near);
+            (size < 0.5 * far).then_some(size)
+        };
+        let sizes = [size(0)?, size(1)?];
+        let from = (0..half).find(|k| all[*k][0][1] >= sizes[0])?;
+        let to = (half..=SAMPLES).rev().find(|k| all[*k][1][0] >= sizes[1])?;
+        Some((time(from), time(to), sizes))
     }
 }
 
