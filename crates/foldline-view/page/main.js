@@ -11,6 +11,7 @@ import { Run } from "./run.js";
 import { csvText, saveCsv, savePng, saveSvg } from "./save.js";
 import { source } from "./source.js";
 import { MultipliersPanel, SpectrumPanel } from "./spectrum.js";
+import { Desk, Pace } from "./study.js";
 
 /** Milliseconds between two steps of a walk along a branch. */
 const STEP = 70;
@@ -49,7 +50,9 @@ class App {
       alone: (id) => this.alone(id),
     });
     this.specialTable = new SpecialTable(byId("special-list"), this.run, this.diagram, (place) => this.select(place, true));
-    this.notes = new Log(byId("log-text"), byId("log-tabs"), this.run);
+    if (this.run.source.live) this.desk = new Desk(this.run, { tell: (text) => this.tell(text), open: () => this.notes.open("study") });
+    this.pace = new Pace(byId("pace"), this.run, (text) => this.tell(text));
+    this.notes = new Log(byId("log-text"), byId("log-tabs"), this.run, this.desk ?? null);
     this.orbit.begin(about);
     this.orbit.show();
     this.spectrum.begin(about);
@@ -125,12 +128,22 @@ class App {
         this.diagram.paths.clear();
         if (this.selected && !this.run.branches.has(this.selected.branch)) this.select(null);
       }
+      await this.texts();
       this.show();
       const { redraw } = this.diagram.chart.cost;
       // A large diagram is drawn less often.
       if (redraw > 25) await new Promise((done) => setTimeout(done, 4 * redraw));
     }
     this.refreshing = false;
+  }
+
+  /** Fetches the study again if the run has another one. */
+  async texts() {
+    const { texts } = this.run.state;
+    if (texts === undefined || texts === (this.known ?? 1)) return;
+    this.known = texts;
+    await this.run.begin();
+    this.desk?.refreshed();
   }
 
   lost(lost) {
@@ -153,6 +166,10 @@ class App {
     this.branchList.show();
     this.specialTable.show();
     this.notes.show();
+    this.desk?.show();
+    this.pace.show();
+    const branch = this.selected && this.run.branches.get(this.selected.branch);
+    this.desk?.offer(branch ?? null, this.selected);
   }
 
   progress() {

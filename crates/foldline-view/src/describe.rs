@@ -1,5 +1,6 @@
 //! Description of a run for the page, as JSON.
 
+use foldline::contract::VectorField;
 use foldline::diagram::{Kind, Origin};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
@@ -19,7 +20,8 @@ pub(crate) fn described(study: &Study, quantities: &[Quantity], folder: &Path) -
     let all = Quantity::names(model);
     let named = quantities.iter().zip(&all).map(|(quantity, name)| {
         let (base, unit, class, text) = parts(*quantity, model);
-        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text })
+        let determined = matches!(*quantity, Quantity::Parameter(k) if model.determined().contains(&k));
+        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text, "determined": determined })
     });
     let channels = model.states.iter().map(|s| (&s.name, &s.unit, &s.description, "state"));
     let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description, "output"));

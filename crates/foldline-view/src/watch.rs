@@ -7,6 +7,7 @@ use crate::describe::{described, state};
 use crate::frame::frame;
 use crate::log::{Log, Stretch};
 use crate::orbit::{Place, solution};
+use foldline::diagram::{Kind, Point};
 use foldline::special::quantity::Quantity;
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
@@ -62,10 +63,14 @@ struct Shared {
     growing: Mutex<Growing>,
     /// Exit code of the process that computes the run, if this program has started it and it has ended.
     code: Mutex<Option<i32>>,
+    /// Reason why the page cannot go on with a longer study.
+    fixed: Mutex<Option<String>>,
 }
 
 struct Growing {
     study: Arc<Study>,
+    /// Number of texts of the study seen.
+    texts: u64,
     quantities: Arc<[Quantity]>,
     /// Number of changes seen.
     version: u64,
@@ -103,6 +108,7 @@ impl Watch {
         let quantities = names.iter().filter_map(|name| Quantity::named(name, &study.model)).collect();
         let growing = Growing {
             study,
+            texts: 1,
             quantities,
             version: 0,
             log: Log::default(),
@@ -112,7 +118,12 @@ impl Watch {
             stamp: None,
             seen: Instant::now(),
         };
-        let shared = Shared { folder: folder.to_path_buf(), growing: Mutex::new(growing), code: Mutex::new(None) };
+        let shared = Shared {
+            folder: folder.to_path_buf(),
+            growing: Mutex::new(growing),
+            code: Mutex::new(None),
+            fixed: Mutex::new(Some("the study of this run is not known here".into())),
+        };
         let watch = Watch(Arc::new(shared));
         watch.look()?;
         Ok(watch)
@@ -121,6 +132,26 @@ impl Watch {
     /// Notes that the process that computes the run has ended.
     pub fn ended(&self, code: i32) {
         *self.0.code.lock().unwrap_or_else(PoisonError::into_inner) = Some(code);
+    }
+
+    /// Notes that a process computes the run again.
+    pub(crate) fn started(&self) {
+        *self.0.code.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Notes whether the page can go on with a longer study, or why it cannot.
+    pub fn editable(&self, can: Result<(), String>) {
+        *self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner) = can.err();
+    }
+
+    /// Reason why the page cannot go on with a longer study, if there is one.
+    pub(crate) fn why_not(&self) -> Option<String> {
+        self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The study as the run has it.
+    pub fn study(&self) -> Arc<Study> {
+        Arc::clone(&self.growing().study)
     }
 
     /// Looks for changes. Returns true if something has changed.
@@ -147,12 +178,22 @@ impl Watch {
         growing.seen = Instant::now();
         let before = growing.notice();
         growing.log.grow(&spans);
+        if run.study_text != growing.study.text {
+            let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
+            // The run itself has read this text.
+            if let Ok(study) = study {
+                growing.study = Arc::new(study);
+                growing.texts += 1;
+            }
+        }
         (growing.written, growing.code) = (written, code);
         let study = Arc::clone(&growing.study);
         let mut state = state(run, &spans, &study, &growing.quantities);
         state["running"] = written.into();
         state["code"] = code.into();
         state["points"] = growing.log.points().into();
+        state["texts"] = growing.texts.into();
+        state["fixed"] = self.why_not().into();
         let text = state.to_string();
         let changed = *text != *growing.state || before != growing.notice();
         if changed {
@@ -236,6 +277,28 @@ impl Watch {
             let (header, columns) = solution(&study.model, &quantities, &point);
             frame(&header, &columns)
         }))
+    }
+
+    /// Returns a point with the name of its branch, and for a special point its kind and its number among those of its
+    /// kind on the branch; `None` if there is no such point.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn place(&self, branch: i64, place: Place) -> Result<Option<(String, Point, Option<(Kind, usize)>)>, RunFileError> {
+        let reading = Reading::open(&self.0.folder)?;
+        let Some(span) = reading.spans()?.into_iter().find(|span| span.number == branch) else { return Ok(None) };
+        match place {
+            Place::Position(position) => Ok(reading.point(branch, position)?.map(|point| (span.name, point, None))),
+            Place::Special(index) => {
+                let Some(own) = reading.special_point(branch, index)? else { return Ok(None) };
+                let mut number = 1;
+                for before in 0..index {
+                    let other = reading.special_point(branch, before)?;
+                    number += usize::from(other.is_some_and(|other| other.kind == own.kind));
+                }
+                Ok(Some((span.name, own.point, Some((own.kind, number)))))
+            }
+        }
     }
 
     fn growing(&self) -> MutexGuard<'_, Growing> {

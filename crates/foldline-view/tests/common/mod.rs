@@ -43,7 +43,7 @@ pub struct Served {
 
 impl Served {
     pub fn new(folder: &Path) -> Served {
-        let server = Server::new(Watch::open(folder).expect("there is a run")).expect("a port is free");
+        let server = Server::new(Watch::open(folder).expect("there is a run"), None).expect("a port is free");
         let address = server.address();
         let rest = address.strip_prefix("http://127.0.0.1:").expect("the server is on this computer");
         let (port, token) = rest.split_once("/?token=").expect("the address has a token");
