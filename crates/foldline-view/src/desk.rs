@@ -48,9 +48,34 @@ impl From<io::Error> for Refused {
 #[derive(Clone)]
 pub struct Desk(Arc<Inner>);
 
+/// Where study, model and run are.
+#[derive(Clone, Debug)]
+pub struct Files {
+    /// The study file.
+    pub study: PathBuf,
+    /// The model file.
+    pub model: PathBuf,
+    /// Folder of the run.
+    pub folder: PathBuf,
+}
+
+/// Model and study to begin with.
+#[derive(Clone, Debug)]
+pub struct Example {
+    /// Its name, also that of its folder.
+    pub name: String,
+    /// What it is about.
+    pub about: String,
+    /// Text of the model.
+    pub model: String,
+    /// Text of the study.
+    pub study: String,
+}
+
 struct Inner {
-    study: PathBuf,
-    folder: PathBuf,
+    files: Mutex<Files>,
+    /// Models to begin with, offered while nothing has been computed.
+    examples: Vec<Example>,
     program: Program,
     watch: Watch,
     /// Held while a request is carried out: one at a time.
@@ -60,12 +85,26 @@ struct Inner {
 }
 
 impl Desk {
-    /// Desk for the run of a study file in a folder. `child` is the process that computes it, if this one has started it.
-    pub fn new(study: &Path, folder: &Path, program: Program, watch: Watch, child: Option<Child>) -> Desk {
+    /// Desk for a run. `child` is the process that computes it, if this one has started it.
+    pub fn new(files: Files, program: Program, watch: Watch, child: Option<Child>) -> Desk {
+        Desk::with_examples(files, program, watch, child, Vec::new())
+    }
+
+    /// Desk with models to begin with.
+    pub fn with_examples(
+        mut files: Files,
+        program: Program,
+        watch: Watch,
+        child: Option<Child>,
+        examples: Vec<Example>,
+    ) -> Desk {
+        // The files themselves are replaced, not links to them.
+        for file in [&mut files.study, &mut files.model] {
+            *file = fs::canonicalize(&*file).unwrap_or_else(|_| file.clone());
+        }
         let inner = Inner {
-            // The file itself is replaced, not a link to it.
-            study: fs::canonicalize(study).unwrap_or_else(|_| study.to_path_buf()),
-            folder: folder.to_path_buf(),
+            files: Mutex::new(files),
+            examples,
             program,
             watch,
             turn: Mutex::new(()),
@@ -78,6 +117,68 @@ impl Desk {
             desk.attend(child);
         }
         desk
+    }
+
+    /// Models to begin with.
+    pub(crate) fn examples(&self) -> &[Example] {
+        &self.0.examples
+    }
+
+    /// Turns to an example, of which nothing is computed or written yet.
+    pub(crate) fn example(&self, index: usize) -> Result<(), Refused> {
+        let _turn = self.turn();
+        let own = self.0.examples.get(index).ok_or_else(|| "there is no such example".to_string())?;
+        let folder = PathBuf::from(&own.name);
+        let files = Files {
+            study: folder.join("study.toml"),
+            model: folder.join("model.toml"),
+            folder: folder.join("run"),
+        };
+        let (study, model) = (files.study.display().to_string(), files.model.display().to_string());
+        let study = parse_study(&own.study, &study, &own.model, &model).map_err(Refused::Mistakes)?;
+        if let Some(there) = [&files.study, &files.model, &files.folder].into_iter().find(|file| file.exists()) {
+            return Err(format!("{} exists already; open it with `foldline view`", there.display()).into());
+        }
+        self.0.watch.turn_to(&files.folder, study);
+        *self.files_lock() = files;
+        Ok(())
+    }
+
+    /// Computes a study of a model from the beginning, in a new folder. Both files are written.
+    ///
+    /// # Errors
+    /// The reason why they cannot be, or the run cannot be started.
+    pub(crate) fn anew(&self, model: &str, text: &str) -> Result<(), Refused> {
+        let _turn = self.turn();
+        let (own, mut files) = (self.0.watch.study(), self.files());
+        let new = parse_study(text, &own.file, model, &own.model_file).map_err(Refused::Mistakes)?;
+        let fresh = !files.study.exists();
+        if fresh {
+            let there = fs::read_to_string(&files.model).ok();
+            if there.is_some_and(|there| there != own.model_text) {
+                return Err(format!("{} was changed elsewhere", files.model.display()).into());
+            }
+        } else {
+            self.in_place(&own)?;
+        }
+        self.stopped()?;
+        if let Some(folder) = files.study.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            fs::create_dir_all(folder)?;
+        }
+        if fs::read_to_string(&files.model).ok().as_deref() != Some(model) {
+            written(&files.model, model)?;
+        }
+        written(&files.study, text)?;
+        let there = read_study(&files.study).map_err(Refused::Mistakes)?;
+        if there.model_text != model {
+            return Err(format!("`model` of the study names another file than {}", files.model.display()).into());
+        }
+        if path_in(&files.folder).exists() {
+            files.folder = unused(&files.folder);
+        }
+        self.0.watch.turn_to(&files.folder, new);
+        *self.files_lock() = files;
+        self.start()
     }
 
     /// Number of the process that computes the run, if this one has started it and it has not ended.
@@ -103,7 +204,8 @@ impl Desk {
             return Err("the study of the run is another one by now; look at it and try again".to_string().into());
         }
         let new = parse_study(text, &own.file, &own.model_text, &own.model_file).map_err(Refused::Mistakes)?;
-        let longer = could_resume(&self.0.folder, &new);
+        let files = self.files();
+        let longer = could_resume(&files.folder, &new);
         let shorter = foldline_store::study_file::added(&new, &own);
         if let (Err(error), Err(_)) = (&longer, &shorter) {
             return Err(error.to_string().into());
@@ -111,18 +213,21 @@ impl Desk {
         self.in_place(&own)?;
         let was_running = self.stopped()?;
         if longer.is_ok() {
-            self.write(&new.text)?;
+            written(&files.study, &new.text)?;
             return self.start();
         }
-        shorten(&self.0.folder, &new).map_err(|error| error.to_string())?;
-        self.write(&new.text)?;
+        shorten(&files.folder, &new).map_err(|error| error.to_string())?;
+        // Numbers of branches may be used again.
+        self.0.watch.look().map_err(|error| error.to_string())?;
+        written(&files.study, &new.text)?;
         if was_running { self.start() } else { Ok(()) }
     }
 
     /// Asks the run to stop at its next point.
     pub(crate) fn stop(&self) -> Result<(), Refused> {
-        if is_written(&self.0.folder) {
-            ask_to_stop(&self.0.folder)?;
+        let Files { folder, .. } = self.files();
+        if is_written(&folder) {
+            ask_to_stop(&folder)?;
         }
         Ok(())
     }
@@ -130,7 +235,7 @@ impl Desk {
     /// Resumes a run that is not being computed.
     pub(crate) fn resume(&self) -> Result<(), Refused> {
         let _turn = self.turn();
-        if is_written(&self.0.folder) {
+        if is_written(&self.files().folder) {
             return Ok(());
         }
         self.in_place(&self.0.watch.study())?;
@@ -139,8 +244,9 @@ impl Desk {
 
     /// Checks that the files on the disk are those of the run.
     fn in_place(&self, own: &Study) -> Result<(), Refused> {
-        let there = read_study(&self.0.study).map_err(Refused::Mistakes)?;
-        let name = self.0.study.display();
+        let files = self.files();
+        let there = read_study(&files.study).map_err(Refused::Mistakes)?;
+        let name = files.study.display();
         if there.text != own.text {
             return Err(format!("{name} is not the study of this run any more; it was changed elsewhere").into());
         }
@@ -152,7 +258,7 @@ impl Desk {
 
     /// Stops the run if it is being computed. Returns true if it was.
     fn stopped(&self) -> Result<bool, Refused> {
-        let folder = &self.0.folder;
+        let Files { folder, .. } = &self.files();
         if !is_written(folder) {
             return Ok(false);
         }
@@ -168,28 +274,10 @@ impl Desk {
         Ok(true)
     }
 
-    /// Replaces the study file. A reader sees the old text or the new one.
-    fn write(&self, text: &str) -> Result<(), Refused> {
-        let study = &self.0.study;
-        let mut beside = study.clone().into_os_string();
-        beside.push(format!(".{}.new", std::process::id()));
-        let beside = PathBuf::from(beside);
-        let written = (|| {
-            let mut file = fs::File::create(&beside)?;
-            file.write_all(text.as_bytes())?;
-            file.set_permissions(fs::metadata(study)?.permissions())?;
-            file.sync_all()?;
-            fs::rename(&beside, study)
-        })();
-        written.map_err(|error: io::Error| {
-            let _ = fs::remove_file(&beside);
-            Refused::Because(format!("{} cannot be written: {error}", study.display()))
-        })
-    }
-
     fn start(&self) -> Result<(), Refused> {
-        let exists = path_in(&self.0.folder).exists();
-        let command = (self.0.program)(&self.0.study, &self.0.folder, exists);
+        let files = self.files();
+        let exists = path_in(&files.folder).exists();
+        let command = (self.0.program)(&files.study, &files.folder, exists);
         let child = command.and_then(|mut command| command.stdin(Stdio::null()).stdout(Stdio::null()).spawn());
         self.attend(child.map_err(|error| format!("the run cannot be started: {error}"))?);
         Ok(())
@@ -208,6 +296,14 @@ impl Desk {
         });
     }
 
+    fn files(&self) -> Files {
+        self.files_lock().clone()
+    }
+
+    fn files_lock(&self) -> MutexGuard<'_, Files> {
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn turn(&self) -> MutexGuard<'_, ()> {
         self.0.turn.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -215,4 +311,34 @@ impl Desk {
     fn child(&self) -> MutexGuard<'_, Option<u32>> {
         self.0.child.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Replaces a file, or creates it. A reader sees the old text or the new one.
+fn written(file: &Path, text: &str) -> Result<(), Refused> {
+    let mut beside = file.to_path_buf().into_os_string();
+    beside.push(format!(".{}.new", std::process::id()));
+    let beside = PathBuf::from(beside);
+    let done = (|| {
+        let mut new = fs::File::create(&beside)?;
+        new.write_all(text.as_bytes())?;
+        if let Ok(old) = fs::metadata(file) {
+            new.set_permissions(old.permissions())?;
+        }
+        new.sync_all()?;
+        fs::rename(&beside, file)
+    })();
+    done.map_err(|error: io::Error| {
+        let _ = fs::remove_file(&beside);
+        Refused::Because(format!("{} cannot be written: {error}", file.display()))
+    })
+}
+
+/// The first of `FOLDER-2`, `FOLDER-3`, … that does not exist.
+fn unused(folder: &Path) -> PathBuf {
+    let numbered = |k: usize| {
+        let mut name = folder.to_path_buf().into_os_string();
+        name.push(format!("-{k}"));
+        PathBuf::from(name)
+    };
+    (2..).map(numbered).find(|folder| !folder.exists()).unwrap_or_else(|| folder.to_path_buf())
 }

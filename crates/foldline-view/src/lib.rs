@@ -28,7 +28,7 @@ mod server;
 mod watch;
 
 pub use browser::open as open_browser;
-pub use desk::{Desk, Program};
+pub use desk::{Desk, Example, Files, Program};
 pub use html::{Amount, html};
 pub use page::script;
 pub use server::{Server, Stop};

@@ -5,6 +5,8 @@
 //! | `/api/check` | `study` or `model`, a text | its mistakes, with line and column |
 //! | `/api/act` | `branch`, `position` or `special`, `action`, perhaps `free` | the longer study, and which of its lines are new |
 //! | `/api/study` | `before`, `text` | nothing; the run goes on with the text |
+//! | `/api/new` | `model`, `study`, two texts | nothing; they are computed from the beginning, in a new folder |
+//! | `/api/example` | `index` | nothing; the page shows the example, of which nothing is computed |
 //! | `/api/stop`, `/api/resume` | nothing | nothing |
 
 use crate::desk::{Desk, Refused};
@@ -17,7 +19,8 @@ use hyper::StatusCode;
 use serde_json::{Value, json};
 
 /// Paths of these requests.
-const PATHS: [&str; 5] = ["/api/check", "/api/act", "/api/study", "/api/stop", "/api/resume"];
+const PATHS: [&str; 7] =
+    ["/api/check", "/api/act", "/api/study", "/api/new", "/api/example", "/api/stop", "/api/resume"];
 /// Largest body, in bytes.
 pub(crate) const LARGEST: u64 = 1 << 20;
 
@@ -34,7 +37,7 @@ pub(crate) fn carried_out(path: &str, body: &[u8], watch: &Watch, desk: Option<&
     let text = |key: &str| body.get(key).and_then(Value::as_str);
     let done = match (path, desk) {
         ("/api/check", _) => match (text("study"), text("model")) {
-            (Some(study), None) => Ok(check_study(watch, study)),
+            (Some(study), model) => Ok(check_study(watch, study, model)),
             (None, Some(model)) => Ok(check_model(watch, model)),
             _ => return bad("`study` or `model` is missing"),
         },
@@ -46,6 +49,14 @@ pub(crate) fn carried_out(path: &str, body: &[u8], watch: &Watch, desk: Option<&
         ("/api/study", Some(desk)) => match (text("before"), text("text")) {
             (Some(before), Some(text)) => desk.study(before, text).map(|()| json!({})),
             _ => return bad("`before` or `text` is missing"),
+        },
+        ("/api/new", Some(desk)) => match (text("model"), text("study")) {
+            (Some(model), Some(study)) => desk.anew(model, study).map(|()| json!({})),
+            _ => return bad("`model` or `study` is missing"),
+        },
+        ("/api/example", Some(desk)) => match body.get("index").and_then(Value::as_u64) {
+            Some(index) => desk.example(usize::try_from(index).unwrap_or(usize::MAX)).map(|()| json!({})),
+            None => return bad("`index` is missing"),
         },
         ("/api/stop", Some(desk)) => desk.stop().map(|()| json!({})),
         ("/api/resume", Some(desk)) => desk.resume().map(|()| json!({})),
@@ -72,14 +83,18 @@ fn mistakes(found: &[Diagnostic]) -> Vec<Value> {
     found.iter().map(one).collect()
 }
 
-fn check_study(watch: &Watch, text: &str) -> Value {
+/// Mistakes of a study of a model, by default that of the run, and the reason why the run cannot go on with it.
+fn check_study(watch: &Watch, text: &str, model: Option<&str>) -> Value {
     let own = watch.study();
-    let found = parse_study(text, &own.file, &own.model_text, &own.model_file);
+    let model = model.unwrap_or(&own.model_text);
+    let found = parse_study(text, &own.file, model, &own.model_file);
+    let in_study = |found: Vec<Diagnostic>| found.into_iter().filter(|one| one.file == own.file).collect::<Vec<_>>();
     let fits = found.as_ref().ok().map(|new| {
         let longer = study_file::added(&own, new);
         longer.map_or_else(|why| study_file::added(new, &own).err().map(|_| why), |_| None)
     });
-    json!({ "mistakes": mistakes(&found.err().unwrap_or_default()), "unfit": fits.flatten() })
+    let fits = if model == own.model_text { fits.flatten() } else { Some("the model is different".into()) };
+    json!({ "mistakes": mistakes(&in_study(found.err().unwrap_or_default())), "unfit": fits })
 }
 
 fn check_model(watch: &Watch, text: &str) -> Value {

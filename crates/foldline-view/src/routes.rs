@@ -24,6 +24,7 @@ use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{CONTENT_TYPE, HeaderValue, LOCATION, SET_COOKIE};
 use hyper::{Method, Request, Response, StatusCode};
+use serde_json::{Value, json};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -135,6 +136,13 @@ impl Routes {
         }
         let asked = self.asked(path, &Query::new(query))?;
         let watch = self.watch.clone();
+        if matches!(asked, Asked::Run) {
+            let mut found = watch.description();
+            let examples = self.desk.as_ref().map_or(&[][..], Desk::examples);
+            let examples = examples.iter().map(|own| json!({ "name": own.name, "about": own.about }));
+            found["examples"] = examples.collect::<Vec<Value>>().into();
+            return Ok(whole(JSON, found.to_string().into_bytes()));
+        }
         // Reading may wait for the disk; other requests do not.
         let found = tokio::task::spawn_blocking(move || asked.read(&watch)).await;
         let (kind, bytes) = found.unwrap_or(Err(StatusCode::INTERNAL_SERVER_ERROR))?;
