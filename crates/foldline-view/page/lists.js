@@ -220,9 +220,10 @@ export class Log {
     const now = JSON.stringify([this.tab, this.run.epoch, this.run.changes]);
     if (now === this.shown) return;
     // An editor keeps its place and its focus.
-    if (this.tab === "study" && this.desk && this.host.contains(this.desk.panel) && this.tabs.childElementCount > 0) return;
+    const panel = this.desk?.panels[this.tab];
+    if (panel && this.host.contains(panel)) return;
     this.shown = now;
-    document.body.toggleAttribute("data-editing", this.tab === "study" && this.desk !== null);
+    document.body.toggleAttribute("data-editing", panel !== undefined);
     this.tabs.replaceChildren(...all.map(([key, text]) => make("button", { type: "button", role: "tab", text, "aria-selected": String(this.tab === key), onclick: () => {
       this.tab = key;
       this.show();
@@ -232,7 +233,8 @@ export class Log {
   }
 
   content(state, about) {
-    if (this.tab === "study" && this.desk) return this.desk.panel;
+    const panel = this.desk?.panels[this.tab];
+    if (panel) return panel;
     if (this.tab === "study" || this.tab === "model") return make("pre", { text: about[this.tab].text, "aria-label": about[this.tab].file });
     const rows = this.tab === "ends" ? this.ends(state) : this.notes(state);
     return make("table", {}, make("tbody", {}, ...rows));

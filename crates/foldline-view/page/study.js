@@ -11,24 +11,35 @@ import { greek } from "./numbers.js";
 const LEAVING = ["period-doubling", "branch-point", "hopf"];
 const FOLLOWED = ["fold", "branch-point", "hopf", "period-doubling", "torus", "grazing", "boundary-equilibrium"];
 
-/** The study beside the diagram, with what is to be computed. */
+/** The study and the model beside the diagram, with what is to be computed. */
 export class Desk {
-  /** @param {import("./run.js").Run} run @param {{tell: (text: string) => void, open: () => void}} heard */
+  /** @param {import("./run.js").Run} run @param {{tell: (text: string) => void, open: (tab: string) => void}} heard */
   constructor(run, heard) {
-    Object.assign(this, { run, heard, added: null, busy: false, said: "", free: null, before: [] });
+    Object.assign(this, { run, heard, busy: false, said: "", free: null, before: [] });
     this.base = run.about.study.text;
+    this.model = run.about.model.text;
     this.editor = new Editor("Text of the study", {
-      check: (text) => run.source.order("check", { study: text }),
+      check: (text) => run.source.order("check", this.modelChanged ? { study: text, model: this.modelEditor.text } : { study: text }),
       changed: () => this.show(),
     });
-    this.buttons = {
-      go: button("Compute", "Put this text into the study and compute what is new", () => this.compute()),
-      drop: button("Discard", "Back to the study of the run", () => this.discard()),
+    this.modelEditor = new Editor("Text of the model", {
+      check: (text) => run.source.order("check", { model: text }),
+      changed: () => {
+        if (this.modelEditor.sound) this.editor.check();
+        this.show();
+      },
+    });
+    const buttons = () => ({
+      go: button("Compute", "Compute what is new", () => this.compute()),
+      drop: button("Discard", "Back to the texts of the run", () => this.discard()),
       undo: button("Undo", "Show the study without what was added last", () => this.undo()),
       python: button("Python", "Copy the Python that runs this study", () => this.python()),
-    };
-    this.note = make("span", { class: "note", role: "status" });
-    this.panel = make("div", { class: "desk" }, make("div", { class: "controls" }, ...Object.values(this.buttons), this.note), this.editor.element);
+      note: make("span", { class: "note", role: "status" }),
+    });
+    this.rows = [buttons(), buttons()];
+    const panel = (row, editor) => make("div", { class: "desk" }, make("div", { class: "controls" }, ...Object.values(row)), editor.element);
+    this.panels = { study: panel(this.rows[0], this.editor), model: panel(this.rows[1], this.modelEditor) };
+    this.modelEditor.set(this.model);
     this.editor.set(this.base);
     this.show();
   }
@@ -37,8 +48,17 @@ export class Desk {
     return this.run.state.fixed ?? null;
   }
 
+  get modelChanged() {
+    return this.modelEditor.text !== this.model;
+  }
+
   get changed() {
-    return this.editor.text !== this.base;
+    return this.editor.text !== this.base || this.modelChanged;
+  }
+
+  /** True if nothing that was computed can be kept. */
+  get fresh() {
+    return this.run.state.draft === true || this.modelChanged || this.editor.unfit !== null;
   }
 
   /** The run has another text by now. */
@@ -48,23 +68,28 @@ export class Desk {
     const untouched = !this.changed;
     const computed = this.editor.text === text;
     this.base = text;
-    if (untouched || computed) {
-      this.added = null;
-      this.editor.set(text, this.editor.lines);
-    }
+    if (untouched || computed) this.editor.set(text, this.editor.lines);
     this.show();
   }
 
   show() {
-    const { go, drop, undo } = this.buttons;
-    const shorter = this.before.at(-1)?.text === this.editor.text;
-    go.textContent = shorter ? "Remove" : "Compute";
-    go.disabled = !this.changed || this.busy || this.fixed !== null || !this.editor.sound;
-    drop.disabled = !this.changed || this.busy;
-    undo.disabled = this.before.length === 0 || this.busy || this.changed;
+    const shorter = this.before.at(-1) === this.editor.text;
+    const draft = this.run.state.draft === true;
+    const mistaken = this.editor.mistakes.length > 0 || this.modelEditor.mistakes.length > 0;
+    const checked = this.editor.checked === this.editor.text && this.modelEditor.checked === this.modelEditor.text;
+    const said = this.fixed !== null ? `The texts cannot be changed here: ${this.fixed}`
+      : this.busy || !this.changed || mistaken || draft || !this.fresh ? this.said
+      : "Nothing computed so far fits: this starts a run in a new folder and keeps the one shown.";
+    for (const { go, drop, undo, note } of this.rows) {
+      go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute anew" : shorter ? "Remove" : "Compute";
+      go.disabled = (!this.changed && !draft) || this.busy || this.fixed !== null || mistaken || !checked;
+      go.classList.toggle("first", !go.disabled);
+      drop.disabled = !this.changed || this.busy;
+      undo.disabled = this.before.length === 0 || this.busy || this.changed;
+      if (note.textContent !== said) note.textContent = said;
+    }
     this.editor.area.readOnly = this.fixed !== null;
-    const said = this.fixed !== null ? `The study cannot be changed here: ${this.fixed}` : this.said;
-    if (this.note.textContent !== said) this.note.textContent = said;
+    this.modelEditor.area.readOnly = this.fixed !== null;
   }
 
   say(text) {
@@ -81,8 +106,7 @@ export class Desk {
       this.heard.tell(error.message);
       return;
     }
-    this.added = found.name;
-    this.heard.open();
+    this.heard.open("study");
     this.editor.set(found.text, found.lines);
     const [first, last] = found.lines;
     const lines = first === last ? `line ${first}` : `lines ${first} to ${last}`;
@@ -91,36 +115,35 @@ export class Desk {
   }
 
   async compute() {
-    const [before, text] = [this.base, this.editor.text];
-    const removing = this.before.at(-1)?.text === text;
+    const [before, text, fresh] = [this.base, this.editor.text, this.fresh];
+    const removing = this.before.at(-1) === text;
     this.busy = true;
     this.say(this.run.state.running ? "Waiting for the run to reach its next point …" : "Starting …");
     try {
-      await this.run.source.order("study", { before, text });
+      if (fresh) await this.run.source.order("new", { model: this.modelEditor.text, study: text });
+      else await this.run.source.order("study", { before, text });
       if (removing) this.before.pop();
-      else this.before.push({ text: before });
-      this.base = text;
-      this.editor.lines = null;
+      else if (!fresh) this.before.push(before);
+      [this.base, this.model] = [text, this.modelEditor.text];
       this.said = removing ? "Removed." : "The run goes on with this study.";
       this.editor.set(text);
     } catch (error) {
       this.said = error.message;
     }
     this.busy = false;
-    this.added = null;
     this.show();
   }
 
   discard() {
-    this.added = null;
+    this.modelEditor.set(this.model);
     this.editor.set(this.base);
     this.say("");
   }
 
   undo() {
     const last = this.before.at(-1);
-    if (!last) return;
-    this.editor.set(last.text);
+    if (last === undefined) return;
+    this.editor.set(last);
     this.say("This is the study without what was added last. Remove deletes its results.");
   }
 
@@ -191,4 +214,21 @@ export class Pace {
     const all = { stop: ["Stop", "Stop the run at its next point"], resume: ["Resume", "Go on with the run"] }[now];
     this.host.replaceChildren(...(all ? [button(all[0], all[1], order(now))] : []));
   }
+}
+
+/** Opens the examples. */
+export function showExamples(run, tell) {
+  const dialog = /** @type {HTMLDialogElement} */ (byId("examples"));
+  const open = async (index) => {
+    dialog.close();
+    try {
+      await run.source.order("example", { index });
+    } catch (error) {
+      tell(error.message);
+    }
+  };
+  const list = run.about.examples.map((own, index) => make("li", {}, button(own.name, `Begin with ${own.name}`, () => open(index)), make("span", { text: own.about })));
+  const close = make("button", { type: "button", text: "Close", onclick: () => dialog.close() });
+  dialog.replaceChildren(make("h2", { id: "examples-head", text: "Begin with an example" }), make("ul", { class: "examples" }, ...list), make("form", {}, close));
+  dialog.showModal();
 }
