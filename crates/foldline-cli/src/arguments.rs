@@ -475,9 +475,10 @@ pub struct Verify {
 
 #[derive(Debug, Args)]
 pub struct View {
-    /// Folder of a run, or a study, whose run is started or resumed
-    #[arg(value_name = "DIR|STUDY.toml")]
-    pub what: PathBuf,
+    /// Folder of a run; a study, whose run is started or resumed; or a model, for a first study [default: examples to begin
+    /// with]
+    #[arg(value_name = "DIR|STUDY.toml|MODEL.toml")]
+    pub what: Option<PathBuf>,
     /// Folder for the run of a study [default: runs/NAME for NAME.toml]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

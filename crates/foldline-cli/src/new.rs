@@ -6,6 +6,7 @@ use foldline::contract::VectorField;
 use foldline::model::Model;
 use foldline_store::model_file::read_model;
 use foldline_store::nearest::suggest;
+use foldline_view::Example;
 use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
@@ -108,7 +109,7 @@ fn study_of(file: &Path, folder: Option<&Path>) -> Result<Outcome, Failure> {
 }
 
 /// A study with one branch in the first parameter.
-fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
+pub fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     let Some(free) = model.parameters.first() else {
         let message = "the model has no parameter in which to follow a branch";
         return Err(Failure::typed(message, "add one, such as `mu = 1` under `[parameters]`"));
@@ -139,6 +140,31 @@ fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
          [[branch]]\nname = \"main\"\nfrom = \"first\"\nfree = {free}\nrange = [{low:?}, {high:?}]\n\
          switch = {{ {switch} }}\n"
     ))
+}
+
+/// The templates and, in a clone of the repository, its models, as examples to begin with.
+pub fn examples() -> Vec<Example> {
+    let templates = TEMPLATES.iter().map(|own| Example {
+        name: own.name.to_string(),
+        about: own.about.to_string(),
+        model: own.model.to_string(),
+        study: own.study.to_string(),
+    });
+    let mut files: Vec<PathBuf> = std::fs::read_dir("models")
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| entry.ok().map(|entry| entry.path()))
+        .filter(|path| path.extension().is_some_and(|end| end == "toml"))
+        .collect();
+    files.sort();
+    let example = |file: &PathBuf| {
+        let (model, text) = read_model(file).ok()?;
+        let study = study_text(&model, Path::new("model.toml")).ok()?;
+        let about = model.description.split_whitespace().collect::<Vec<_>>().join(" ");
+        let name = file.file_stem()?.to_string_lossy().into_owned();
+        Some(Example { name, about, model: text, study })
+    };
+    templates.chain(files.iter().filter_map(example)).collect()
 }
 
 /// Writes new files; writes none if one of them already exists.

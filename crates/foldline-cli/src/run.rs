@@ -12,7 +12,7 @@ use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
 use foldline_plot::Picture;
 use foldline_store::order::{names, ordered};
-use foldline_store::run_file::Recorder;
+use foldline_store::run_file::{Recorder, forget_stop, is_asked_to_stop};
 use foldline_store::study_file::{Study, read_study};
 use std::io::{Write, stderr, stdout};
 use std::path::{Path, PathBuf};
@@ -111,13 +111,18 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     let Way { jobs, limit, folder, .. } = *way;
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
     let clock = Clock::new(limit);
-    let system = explore::System::of_plan(&study.model, &study.plan);
+    forget_stop(folder);
+    let mut system = explore::System::of_plan(&study.model, &study.plan);
+    if let (false, Some(scales)) = (earlier.branches.is_empty(), watch.recorder.scales()) {
+        system = system.scaled(&study.model, scales);
+    }
     let diagram = std::thread::scope(|scope| {
-        scope.spawn(|| clock.run(&watch));
+        scope.spawn(|| clock.run(&watch, folder));
         let _done = Done(&clock);
         explore::run(&system, &study.plan, jobs, earlier, &watch)
     });
     watch.progress.finish();
+    forget_stop(folder);
     let stopped = watch.stop.load(Ordering::Relaxed);
     if stopped {
         watch.recorder.finish()?
@@ -201,12 +206,15 @@ impl Clock {
         self.up.load(Ordering::Relaxed)
     }
 
-    fn run(&self, watch: &Watch) {
+    fn run(&self, watch: &Watch, folder: &Path) {
         let mut over = self.over.lock().unwrap_or_else(PoisonError::into_inner);
         while !*over {
             let now = Instant::now();
             if self.deadline.is_some_and(|deadline| now >= deadline) && !watch.stop.swap(true, Ordering::Relaxed) {
                 self.up.store(true, Ordering::Relaxed);
+            }
+            if is_asked_to_stop(folder) {
+                watch.stop.store(true, Ordering::Relaxed);
             }
             watch.progress.remind();
             let left = self.deadline.map_or(Clock::TICK, |deadline| deadline.saturating_duration_since(now));

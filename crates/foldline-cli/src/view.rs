@@ -2,17 +2,20 @@
 
 use crate::arguments::View as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::new::{examples, study_text};
 use crate::run::folder_of;
 use crate::verbosity::report;
-use foldline_store::run_file::{Part, Reading, is_written, path_in};
-use foldline_store::study_file::{Study, is_study, read_study};
-use foldline_view::{Server, Watch, open_browser};
+use foldline::explore::Plan;
+use foldline::model::Model;
+use foldline_store::model_file::{parse_model, read_model};
+use foldline_store::run_file::{Part, Reading, could_resume, is_written, path_in};
+use foldline_store::study_file::{Store, Study, is_study, read_study};
+use foldline_view::{Desk, Example, Files, Program, Server, Watch, open_browser};
 use std::io::{Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
-use std::thread::{sleep, spawn};
+use std::thread::sleep;
 use std::time::Duration;
 
 /// Interval between two attempts to open a run file that is being created.
@@ -22,25 +25,110 @@ const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Shows a run, or starts the run of a study and shows it.
 pub fn show(typed: &Typed) -> Result<Outcome, Failure> {
-    let what = &typed.what;
+    let Some(what) = &typed.what else { return gallery(typed) };
     if what.is_dir() || what.file_name().is_some_and(|name| name == "run.sqlite") {
         let folder = if what.is_dir() { what.clone() } else { folder_above(what) };
-        return served(Watch::open(&folder)?, None, &folder, typed);
+        let watch = Watch::open(&folder)?;
+        let desk = desk_of_run(&watch, &folder, typed);
+        return served(watch, desk, &folder, typed);
     }
     // If the file cannot be read, the study reader reports why.
     let text = std::fs::read_to_string(what).unwrap_or_default();
     if !text.is_empty() && !is_study(&text) {
-        let message = format!("{}: this is not a study", what.display());
-        let cure = format!("`foldline new --study {}` writes a study for a model", what.display());
-        return Err(Failure::typed(message, cure));
+        return model(what, typed);
     }
     let study = read_study(what)?;
     let folder = folder_of(what, typed.out.as_deref());
-    let Some(mut child) = started(&study, &folder, typed)? else {
-        return served(Watch::open(&folder)?, None, &folder, typed);
+    let Some(mut child) = started(what, &study, &folder, typed)? else {
+        let watch = Watch::open(&folder)?;
+        let desk = Desk::new(files(what, &study, &folder), program(typed), watch.clone(), None);
+        return served(watch, Some(desk), &folder, typed);
     };
     let watch = opened(&folder, &mut child)?;
-    served(watch, Some(child), &folder, typed)
+    let desk = Desk::new(files(what, &study, &folder), program(typed), watch.clone(), Some(child));
+    served(watch, Some(desk), &folder, typed)
+}
+
+fn files(study: &Path, read: &Study, folder: &Path) -> Files {
+    Files { study: study.to_path_buf(), model: PathBuf::from(&read.model_file), folder: folder.to_path_buf() }
+}
+
+/// Shows a model with a study of it, of which nothing is computed before the page asks for it.
+fn model(file: &Path, typed: &Typed) -> Result<Outcome, Failure> {
+    let (model, model_text) = read_model(file)?;
+    let stem = file.file_stem().unwrap_or("model".as_ref()).to_string_lossy().into_owned();
+    let study = file.with_file_name(format!("{stem}-study.toml"));
+    if study.exists() {
+        let message = format!("{} exists already", study.display());
+        return Err(Failure::typed(message, format!("`foldline view {}` shows it", study.display())));
+    }
+    let text = study_text(&model, Path::new(file.file_name().unwrap_or_default()))?;
+    let folder = folder_of(&study, typed.out.as_deref());
+    drafted(&folder, study, file.to_path_buf(), text, model, model_text, Vec::new(), typed)
+}
+
+/// Shows examples to begin with.
+fn gallery(typed: &Typed) -> Result<Outcome, Failure> {
+    let examples = examples();
+    let Some(first) = examples.first() else { return Err(Failure::Outside("there are no examples".into())) };
+    let model = parse_model(&first.model, "model.toml")?;
+    let folder = PathBuf::from(&first.name);
+    let (study, file) = (folder.join("study.toml"), folder.join("model.toml"));
+    let (text, model_text) = (first.study.clone(), first.model.clone());
+    drafted(&folder.join("run"), study, file, text, model, model_text, examples, typed)
+}
+
+fn drafted(
+    folder: &Path,
+    study: PathBuf,
+    model_file: PathBuf,
+    text: String,
+    model: Model,
+    model_text: String,
+    examples: Vec<Example>,
+    typed: &Typed,
+) -> Result<Outcome, Failure> {
+    let draft = Study {
+        file: study.display().to_string(),
+        text,
+        model_file: model_file.display().to_string(),
+        model_text,
+        model,
+        plan: Plan::empty(1e-6, 4),
+        store: Store::All,
+        spreads: Vec::new(),
+        uncertainty: false,
+    };
+    let watch = Watch::draft(folder, draft);
+    let files = Files { study, model: model_file, folder: folder.to_path_buf() };
+    let desk = Desk::with_examples(files, program(typed), watch.clone(), None, examples);
+    served(watch, Some(desk), folder, typed)
+}
+
+/// Desk for a run whose study file is where it was, and as it was; otherwise the page says why the study is fixed.
+fn desk_of_run(watch: &Watch, folder: &Path, typed: &Typed) -> Option<Desk> {
+    let own = watch.study();
+    let there = read_study(Path::new(&own.file)).ok();
+    if there.is_some_and(|there| there.text == own.text && there.model_text == own.model_text) {
+        return Some(Desk::new(files(Path::new(&own.file), &own, folder), program(typed), watch.clone(), None));
+    }
+    watch.editable(Err(format!(
+        "{} is not there, or it or its model has changed since the run began; `foldline view STUDY.toml --out DIR` names it",
+        own.file
+    )));
+    None
+}
+
+/// Command that computes the run of a study.
+fn program(typed: &Typed) -> Program {
+    let jobs = typed.jobs;
+    Box::new(move |study, folder, resume| {
+        let mut command = Command::new(std::env::current_exe()?);
+        command.arg("run").arg(study).arg("--out").arg(folder);
+        command.args(resume.then_some("--resume"));
+        command.args(jobs.map(|jobs| format!("--jobs={jobs}")));
+        Ok(command)
+    })
 }
 
 fn folder_above(file: &Path) -> PathBuf {
@@ -49,7 +137,7 @@ fn folder_above(file: &Path) -> PathBuf {
 
 /// Starts or resumes the run of a study in a process of its own, which outlives this one if necessary. `None` if another
 /// process is computing it, or it is complete and cannot be resumed.
-fn started(study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>, Failure> {
+fn started(what: &Path, study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>, Failure> {
     let exists = path_in(folder).exists();
     if exists {
         if is_written(folder) {
@@ -58,7 +146,8 @@ fn started(study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>,
         }
         let reading = Reading::open(folder)?;
         let stored = reading.recorded(Part::Special)?;
-        if stored.study_text != study.text || stored.model_text != study.model_text {
+        let same = stored.study_text == study.text && stored.model_text == study.model_text;
+        if !same && could_resume(folder, study).is_err() {
             let message = format!("the study or its model has changed since the run in {} began", folder.display());
             let cure = format!(
                 "start a new run with --out DIR, or show the old one with `foldline view {}`",
@@ -70,10 +159,7 @@ fn started(study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>,
             return Ok(None);
         }
     }
-    let mut command = Command::new(std::env::current_exe()?);
-    command.arg("run").arg(&typed.what).arg("--out").arg(folder);
-    command.args(exists.then_some("--resume"));
-    command.args(typed.jobs.map(|jobs| format!("--jobs={jobs}")));
+    let mut command = program(typed)(what, folder, exists)?;
     let child = command.stdin(Stdio::null()).stdout(Stdio::null()).spawn();
     child.map(Some).map_err(|error| Failure::Outside(format!("the run cannot be started: {error}")))
 }
@@ -95,9 +181,9 @@ fn opened(folder: &Path, child: &mut Child) -> Result<Watch, Failure> {
 }
 
 /// Serves until Ctrl-C.
-fn served(watch: Watch, child: Option<Child>, folder: &Path, typed: &Typed) -> Result<Outcome, Failure> {
+fn served(watch: Watch, desk: Option<Desk>, folder: &Path, typed: &Typed) -> Result<Outcome, Failure> {
     let server =
-        Server::new(watch.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
+        Server::new(watch, desk.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
     let address = server.address();
     writeln!(stdout(), "{address}")?;
     stdout().flush()?;
@@ -105,8 +191,6 @@ fn served(watch: Watch, child: Option<Child>, folder: &Path, typed: &Typed) -> R
     if !typed.no_browser && !open_browser(&address) {
         report(format_args!("no browser can be opened here; open the address in one on this computer"))?;
     }
-    let process = child.as_ref().map(Child::id);
-    let over = child.map(|child| ending(child, watch));
     let (stop, again) = (server.stopper(), AtomicBool::new(false));
     let handler = move || {
         if again.swap(true, Ordering::Relaxed) {
@@ -117,24 +201,14 @@ fn served(watch: Watch, child: Option<Child>, folder: &Path, typed: &Typed) -> R
     // Without a handler Ctrl-C ends the program at once, which harms nothing.
     let _ = ctrlc::set_handler(handler);
     server.run().map_err(|error| Failure::Outside(format!("the server has failed: {error}")))?;
-    if let (Some(over), Some(process)) = (over, process)
-        && over.recv_timeout(PATIENCE).is_err()
+    if let Some(desk) = desk
+        && !desk.wait(PATIENCE)
+        && let Some(process) = desk.process()
     {
         let folder = folder.display();
         writeln!(stderr(), "the run continues in process {process}; `foldline view {folder}` shows it again")?;
     }
     Ok(Outcome::Done)
-}
-
-/// Tells `watch` when the process has ended, and by what code. The receiver hears of it too.
-fn ending(mut child: Child, watch: Watch) -> Receiver<()> {
-    let (sender, receiver) = channel();
-    spawn(move || {
-        let code = child.wait().ok().and_then(|status| status.code()).unwrap_or(1);
-        watch.ended(code);
-        let _ = sender.send(());
-    });
-    receiver
 }
 
 impl From<foldline_view::Failure> for Failure {

@@ -1,7 +1,7 @@
 //! Order in which branches are listed.
 
 use foldline::diagram::{Branch, Diagram, Origin};
-use foldline::explore::{Plan, Start};
+use foldline::explore::{Near, Plan, Start};
 use std::cmp::Ordering;
 
 /// Names of the branches, curves and homotopies of a study in the order of the file, each after the one it starts from;
@@ -27,7 +27,9 @@ impl Names<'_> {
         let plan = self.plan;
         let (name, from) = match what {
             Start::Seed(_) => return,
-            Start::EndOfSwitched(index, _) => return self.add(&Start::EndOf(*index)),
+            Start::EndOfSwitched(index, _) | Start::Near(Near { branch: index, .. }) => {
+                return self.add(&Start::EndOf(*index));
+            }
             Start::EndOf(index) => (&plan.branches[*index].name, Some(&plan.branches[*index].start)),
             Start::EndOfCurve(index) => (&plan.curves[*index].name, None),
             Start::EndOfHomotopy(index) => (&plan.homotopies[*index].name, Some(&plan.homotopies[*index].start)),

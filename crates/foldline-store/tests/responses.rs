@@ -1,5 +1,6 @@
 //! Surveys and sweeps in study files: plans, and diagnostics for mistakes.
 
+use foldline::explore::Start;
 use foldline_store::study_file::{Study, parse_study};
 
 const MODEL: &str = "name = \"pitchfork\"\n[parameters]\nmu = 1.0\nK = 2.0\n[states.x]\nequation = \"mu*x - K*x^3\"\n";
@@ -39,7 +40,7 @@ fn a_study_may_simulate_only() {
     let (survey, sweep) = (&plan.surveys[0], &plan.sweeps[0]);
     assert_eq!((survey.values.as_slice(), survey.starts, survey.random), (&[-1.0, 0.0, 1.0, 2.0][..], 8, 1));
     assert_eq!(survey.parameters, [1.0, 1.0]);
-    assert_eq!((sweep.values.as_slice(), sweep.seed, sweep.free), (&[2.0, 1.5, 1.0, 0.5][..], 0, 0));
+    assert_eq!((sweep.values.as_slice(), &sweep.start, sweep.free), (&[2.0, 1.5, 1.0, 0.5][..], &Start::Seed(0), 0));
     let listed = STUDY.replace("range = [2, 0.5]\ncount = 4", "values = [1, 3, 2]");
     assert_eq!(parse(&listed).unwrap().plan.sweeps[0].values, [1.0, 3.0, 2.0]);
 }

@@ -203,8 +203,14 @@ export function showPoint(host, run, branch, place, header) {
 
 /** Ends, notes, and texts of study and model. */
 export class Log {
-  constructor(host, tabs, run) {
-    Object.assign(this, { host, tabs, run, tab: "ends", shown: "" });
+  constructor(host, tabs, run, desk = null) {
+    Object.assign(this, { host, tabs, run, desk, tab: "ends", shown: "" });
+  }
+
+  /** Shows one of the texts. */
+  open(tab) {
+    this.tab = tab;
+    this.show();
   }
 
   show() {
@@ -213,7 +219,11 @@ export class Log {
     const all = [["ends", "Ends"], ["notes", `Notes (${notes})`], ["study", "Study"], ["model", "Model"]];
     const now = JSON.stringify([this.tab, this.run.epoch, this.run.changes]);
     if (now === this.shown) return;
+    // An editor keeps its place and its focus.
+    const panel = this.desk?.panels[this.tab];
+    if (panel && this.host.contains(panel)) return;
     this.shown = now;
+    document.body.toggleAttribute("data-editing", panel !== undefined);
     this.tabs.replaceChildren(...all.map(([key, text]) => make("button", { type: "button", role: "tab", text, "aria-selected": String(this.tab === key), onclick: () => {
       this.tab = key;
       this.show();
@@ -223,6 +233,8 @@ export class Log {
   }
 
   content(state, about) {
+    const panel = this.desk?.panels[this.tab];
+    if (panel) return panel;
     if (this.tab === "study" || this.tab === "model") return make("pre", { text: about[this.tab].text, "aria-label": about[this.tab].file });
     const rows = this.tab === "ends" ? this.ends(state) : this.notes(state);
     return make("table", {}, make("tbody", {}, ...rows));

@@ -11,6 +11,7 @@ import { Run } from "./run.js";
 import { csvText, saveCsv, savePng, saveSvg } from "./save.js";
 import { source } from "./source.js";
 import { MultipliersPanel, SpectrumPanel } from "./spectrum.js";
+import { Desk, Pace, showExamples } from "./study.js";
 
 /** Milliseconds between two steps of a walk along a branch. */
 const STEP = 70;
@@ -49,7 +50,9 @@ class App {
       alone: (id) => this.alone(id),
     });
     this.specialTable = new SpecialTable(byId("special-list"), this.run, this.diagram, (place) => this.select(place, true));
-    this.notes = new Log(byId("log-text"), byId("log-tabs"), this.run);
+    if (this.run.source.live) this.desk = new Desk(this.run, { tell: (text) => this.tell(text), open: (tab) => this.notes.open(tab) });
+    this.pace = new Pace(byId("pace"), this.run, (text) => this.tell(text));
+    this.notes = new Log(byId("log-text"), byId("log-tabs"), this.run, this.desk ?? null);
     this.orbit.begin(about);
     this.orbit.show();
     this.spectrum.begin(about);
@@ -70,6 +73,8 @@ class App {
     this.log = [asked.get("logx") === "1", asked.get("logy") === "1"];
     await this.axes(named("x", defaults.x), named("y", defaults.y));
     this.recall(asked);
+    this.early = this.run.listed().length === 0 && !asked.has("x");
+    if (this.run.state.draft) this.drafted();
     this.ready = true;
     this.run.source.listen((notice) => this.grew(notice), (lost) => this.lost(lost));
   }
@@ -125,12 +130,51 @@ class App {
         this.diagram.paths.clear();
         if (this.selected && !this.run.branches.has(this.selected.branch)) this.select(null);
       }
+      await this.texts();
+      if (this.early && this.run.listed().some((own) => own.length > 0)) {
+        this.early = false;
+        this.diagram.chart.empty.textContent = "";
+        const { x, y } = this.run.defaults();
+        await this.axes(x, y);
+      }
       this.show();
       const { redraw } = this.diagram.chart.cost;
       // A large diagram is drawn less often.
       if (redraw > 25) await new Promise((done) => setTimeout(done, 4 * redraw));
     }
     this.refreshing = false;
+  }
+
+  /** Fetches the study again if the run has another one. */
+  async texts() {
+    const { texts } = this.run.state;
+    if (texts === undefined || texts === this.known) return;
+    const first = this.known === undefined;
+    this.known = texts;
+    if (first) return;
+    const { model, folder } = this.run.about;
+    await this.run.begin();
+    const { about } = this.run;
+    if (about.model.text !== model.text || about.folder !== folder) {
+      // Another run: other quantities, other places.
+      history.replaceState(null, "", location.pathname);
+      location.reload();
+      return;
+    }
+    this.desk?.refreshed();
+  }
+
+  /** Nothing has been computed yet: the texts come first. */
+  drafted() {
+    this.diagram.chart.empty.textContent = "Nothing is computed yet. Compute runs the study.";
+    this.notes.open("model");
+    const { about } = this.run;
+    if (about.examples?.length > 0) {
+      const show = () => showExamples(this.run, (text) => this.tell(text));
+      byId("pace").after(button("Examples", "Begin with an example", show));
+      if (!sessionStorage.getItem("begun")) show();
+      sessionStorage.setItem("begun", "yes");
+    }
   }
 
   lost(lost) {
@@ -153,6 +197,10 @@ class App {
     this.branchList.show();
     this.specialTable.show();
     this.notes.show();
+    this.desk?.show();
+    this.pace.show();
+    const branch = this.selected && this.run.branches.get(this.selected.branch);
+    this.desk?.offer(branch ?? null, this.selected);
   }
 
   progress() {
@@ -160,10 +208,13 @@ class App {
     const points = [...this.run.branches.values()].reduce((sum, branch) => sum + branch.length, 0);
     const element = byId("progress");
     const short = state.shortfalls.length > 0 || state.branches.some((own) => own.ends.some((end) => end && !end.complete));
-    const said = !from.live ? "saved page" : !this.connected ? "no connection: foldline view has ended" : state.running ? "running" : state.code === null || state.code === 0 ? "complete" : state.code === 3 ? "incomplete" : "stopped";
+    const said = !from.live ? "saved page" : state.draft ? "not computed" : !this.connected ? "no connection: foldline view has ended" : state.running ? "running" : state.code === null || state.code === 0 ? "complete" : state.code === 3 ? "incomplete" : "stopped";
     const now = said === "complete" && short ? "incomplete" : said;
     element.className = now === "running" ? "running" : ["incomplete", "stopped"].includes(now) || !this.connected ? "short" : "";
-    const text = `${now} · ${points} points · ${state.special.length} special`;
+    // Branches, curves, surveys and sweeps of the study; how long each takes is not known beforehand.
+    const [done, of] = state.requests ?? [0, 0];
+    const part = now === "running" && of > 1 ? ` · ${done} of ${of} done` : "";
+    const text = `${now}${part} · ${points} points · ${state.special.length} special`;
     if (element.textContent !== text) element.textContent = text;
     // Announced only when it changes, not with every point.
     if (this.said !== undefined && this.said !== now) this.tell(`The run is ${now}: ${points} points, ${state.special.length} special points.`);

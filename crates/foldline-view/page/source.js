@@ -8,6 +8,7 @@
  *   state: () => Promise<any>,
  *   points: (epoch: number, since: number, columns: number[]) => Promise<Frame>,
  *   solution: (branch: number, position: number, special: number) => Promise<Frame | null>,
+ *   order: (what: string, body: any) => Promise<any>,
  *   listen: (heard: (notice: any) => void, lost: (isLost: boolean) => void) => void,
  * }} Source
  */
@@ -59,6 +60,15 @@ function server() {
       const place = special >= 0 ? `special=${special}` : `position=${position}`;
       const answer = await get(`/api/solution?branch=${branch}&${place}`);
       return answer && frameOf(await answer.arrayBuffer(), ofSolution);
+    },
+    order: async (what, body) => {
+      const answer = await fetch(`/api/${what}`, { method: "POST", credentials: "same-origin", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
+      const found = await answer.json().catch(() => ({ error: `${what}: ${answer.status}` }));
+      if (!answer.ok) {
+        const first = found.mistakes?.[0];
+        throw new Error(first ? `line ${first.line}: ${first.message}` : found.error);
+      }
+      return found;
     },
     listen: (heard, lost) => {
       const events = new EventSource("/api/events");
@@ -115,6 +125,9 @@ function embedded() {
         }
       }
       return null;
+    },
+    order: async () => {
+      throw new Error("a saved page computes nothing");
     },
     listen: () => {},
   };

@@ -1,5 +1,6 @@
 //! Description of a run for the page, as JSON.
 
+use foldline::contract::VectorField;
 use foldline::diagram::{Kind, Origin};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
@@ -19,7 +20,8 @@ pub(crate) fn described(study: &Study, quantities: &[Quantity], folder: &Path) -
     let all = Quantity::names(model);
     let named = quantities.iter().zip(&all).map(|(quantity, name)| {
         let (base, unit, class, text) = parts(*quantity, model);
-        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text })
+        let determined = matches!(*quantity, Quantity::Parameter(k) if model.determined().contains(&k));
+        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text, "determined": determined })
     });
     let channels = model.states.iter().map(|s| (&s.name, &s.unit, &s.description, "state"));
     let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description, "output"));
@@ -72,7 +74,18 @@ fn parts(quantity: Quantity, model: &Model) -> (&str, &str, &'static str, &str) 
 pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[Quantity]) -> Value {
     let numbers: HashMap<&str, i64> = spans.iter().map(|span| (span.name.as_str(), span.number)).collect();
     let reach: HashMap<i64, [i64; 2]> = spans.iter().filter_map(|span| Some((span.number, span.reach?))).collect();
-    let diagram = ordered(run.diagram, &names(&study.plan));
+    let planned = names(&study.plan);
+    let diagram = ordered(run.diagram, &planned);
+    let plan = &study.plan;
+    // The branches of homotopies and explorations are not known beforehand.
+    let single = |name: &&String| {
+        !plan.homotopies.iter().any(|own| own.name == **name) && !plan.explorations.iter().any(|own| own.name == **name)
+    };
+    let simulated = || plan.surveys.iter().map(|own| &own.name).chain(plan.sweeps.iter().map(|own| &own.name));
+    let ended = |name: &&String| diagram.branch(name).is_some_and(|own| own.ends.iter().all(Option::is_some));
+    let done = planned.iter().filter(single).filter(ended).count()
+        + simulated().filter(|name| diagram.response_set(name).is_some()).count();
+    let of = planned.iter().filter(single).count() + simulated().count();
     let (mut branches, mut special) = (Vec::new(), Vec::new());
     for branch in &diagram.branches {
         let Some(number) = numbers.get(branch.name.as_str()).copied() else { continue };
@@ -115,7 +128,7 @@ pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[
     });
     let shortfalls = diagram.shortfalls.iter().map(|own| json!([own.about, own.what]));
     json!({
-        "branches": branches, "special": special, "notes": run.notes,
+        "branches": branches, "special": special, "notes": run.notes, "requests": [done, of],
         "responses": responses.collect::<Vec<_>>(), "shortfalls": shortfalls.collect::<Vec<_>>(),
     })
 }

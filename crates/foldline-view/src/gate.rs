@@ -10,14 +10,18 @@
 //! | `Origin`, if present, is this server | 403 |
 //! | `Sec-Fetch-Site`, if present, is `same-origin` or `none` | 403 |
 //! | at most 2048 bytes of path and query | 414 |
-//! | the method is GET | 405 |
-//! | no body | 413 |
-//! | the cookie, or at `/` the token, which works once | 403 |
+//! | the method is GET, or POST for a path that takes a body | 405 |
+//! | GET: no body | 413 |
+//! | POST: an `Origin` | 403 |
+//! | POST: `Content-Type: application/json`, which no other page can send | 415 |
+//! | POST: a `Content-Length`, at most 1 MiB | 411, 413 |
+//! | the cookie, or for GET of `/` the token, which works once | 403 |
 
+use crate::orders;
 use crate::query::Query;
 use hyper::Method;
 use hyper::StatusCode;
-use hyper::header::{CONTENT_LENGTH, COOKIE, HOST, HeaderMap, ORIGIN, TRANSFER_ENCODING};
+use hyper::header::{CONTENT_LENGTH, CONTENT_TYPE, COOKIE, HOST, HeaderMap, ORIGIN, TRANSFER_ENCODING};
 use hyper::http::request::Parts;
 use std::sync::{Mutex, PoisonError};
 
@@ -87,15 +91,21 @@ impl Gate {
         if request.uri.path_and_query().map_or(0, |path| path.as_str().len()) > LONGEST {
             return Err(StatusCode::URI_TOO_LONG);
         }
-        if request.method != Method::GET {
+        let orders = request.method == Method::POST && orders::takes(request.uri.path());
+        if request.method != Method::GET && !orders {
             return Err(StatusCode::METHOD_NOT_ALLOWED);
         }
         let length = headers.get(CONTENT_LENGTH).map_or(&b"0"[..], |length| length.as_bytes());
-        if length != b"0" || headers.contains_key(TRANSFER_ENCODING) {
+        if orders {
+            fits(headers)?;
+        } else if length != b"0" || headers.contains_key(TRANSFER_ENCODING) {
             return Err(StatusCode::PAYLOAD_TOO_LARGE);
         }
         if self.is_known(headers) {
             return Ok(Entry::Known);
+        }
+        if orders {
+            return Err(StatusCode::FORBIDDEN);
         }
         let query = Query::new(request.uri.query().unwrap_or(""));
         match query.text("token") {
@@ -130,6 +140,22 @@ impl Gate {
         }
         right
     }
+}
+
+/// Checks the headers of a request with a body.
+fn fits(headers: &HeaderMap) -> Result<(), StatusCode> {
+    if headers.get_all(ORIGIN).iter().count() != 1 {
+        return Err(StatusCode::FORBIDDEN);
+    }
+    if headers.get_all(CONTENT_TYPE).iter().map(|own| own.as_bytes()).ne([&b"application/json"[..]]) {
+        return Err(StatusCode::UNSUPPORTED_MEDIA_TYPE);
+    }
+    if headers.contains_key(TRANSFER_ENCODING) {
+        return Err(StatusCode::LENGTH_REQUIRED);
+    }
+    let length = headers.get(CONTENT_LENGTH).ok_or(StatusCode::LENGTH_REQUIRED)?;
+    let length = length.to_str().ok().and_then(|text| text.parse::<u64>().ok()).ok_or(StatusCode::BAD_REQUEST)?;
+    if length <= orders::LARGEST { Ok(()) } else { Err(StatusCode::PAYLOAD_TOO_LARGE) }
 }
 
 /// True if two texts are equal. The time depends on their lengths only.

@@ -37,6 +37,13 @@ impl Stretch {
 }
 
 impl Log {
+    /// Begins a new epoch without points.
+    pub(crate) fn restart(&mut self) {
+        self.restarts += 1;
+        self.stretches.clear();
+        self.reach.clear();
+    }
+
     /// Number of times that the log has begun.
     pub(crate) fn epoch(&self) -> u64 {
         self.restarts + 1
@@ -54,9 +61,7 @@ impl Log {
             reach.is_some_and(|[first, last]| first <= *low && last >= *high)
         };
         if !self.reach.iter().all(kept) {
-            self.restarts += 1;
-            self.stretches.clear();
-            self.reach.clear();
+            self.restart();
         }
         for (branch, [first, last]) in spans.iter().filter_map(|span| Some((span.number, span.reach?))) {
             let parts = match self.reach.insert(branch, [first, last]) {

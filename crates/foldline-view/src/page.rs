@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 /// Modules of the script, each after those that it imports.
-const MODULES: [&str; 15] = [
+const MODULES: [&str; 17] = [
     include_str!("../page/numbers.js"),
     include_str!("../page/colours.js"),
     include_str!("../page/dom.js"),
@@ -20,6 +20,8 @@ const MODULES: [&str; 15] = [
     include_str!("../page/orbit.js"),
     include_str!("../page/spectrum.js"),
     include_str!("../page/lists.js"),
+    include_str!("../page/editor.js"),
+    include_str!("../page/study.js"),
     include_str!("../page/save.js"),
     include_str!("../page/keys.js"),
     include_str!("../page/main.js"),

@@ -8,19 +8,23 @@
 //! | `/api/points?epoch=E&since=N&columns=K,K,...` | points from cursor N on ([`frame`](crate::frame)) |
 //! | `/api/solution?branch=B&position=P` or `&special=K` | one solution (frame) |
 //! | `/api/events` | `grew` whenever something has changed (server-sent events) |
+//! | POST | see [`orders`](crate::orders) |
 
 use crate::body::{Answer, First, first};
+use crate::desk::Desk;
 use crate::gate::{Entry, Gate};
 use crate::orbit::Place;
+use crate::orders;
 use crate::page;
 use crate::query::Query;
 use crate::server::Notices;
 use crate::watch::{Notice, Watch};
 use foldline_store::run_file::RunFileError;
-use http_body_util::Full;
+use http_body_util::{BodyExt, Full, Limited};
 use hyper::body::{Bytes, Incoming};
 use hyper::header::{CONTENT_TYPE, HeaderValue, LOCATION, SET_COOKIE};
-use hyper::{Request, Response, StatusCode};
+use hyper::{Method, Request, Response, StatusCode};
+use serde_json::{Value, json};
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -63,6 +67,7 @@ const BYTES: &str = "application/octet-stream";
 pub(crate) struct Routes {
     pub(crate) gate: Gate,
     watch: Watch,
+    desk: Option<Desk>,
     notices: Notices,
     streams: Arc<AtomicUsize>,
 }
@@ -70,17 +75,18 @@ pub(crate) struct Routes {
 type Whole = Result<(&'static str, Vec<u8>), StatusCode>;
 
 impl Routes {
-    pub(crate) fn new(gate: Gate, watch: Watch) -> Routes {
+    pub(crate) fn new(gate: Gate, watch: Watch, desk: Option<Desk>) -> Routes {
         let notices = watch::channel(watch.notice()).0;
-        Routes { gate, watch, notices, streams: Arc::default() }
+        Routes { gate, watch, desk, notices, streams: Arc::default() }
     }
 
     /// Answers a request. Nothing of it is examined before it has passed the gate.
     pub(crate) async fn answer(&self, request: Request<Incoming>) -> Response<Answer> {
-        let (parts, _) = request.into_parts();
+        let (parts, body) = request.into_parts();
         let answer = match self.gate.check(&parts) {
             Err(status) => refusal(status),
             Ok(Entry::New) => self.entered(),
+            Ok(Entry::Known) if parts.method == Method::POST => self.ordered(parts.uri.path(), body).await,
             Ok(Entry::Known) => {
                 let (path, query) = (parts.uri.path(), parts.uri.query().unwrap_or(""));
                 match tokio::time::timeout(LONGEST, self.routed(path, query)).await {
@@ -104,6 +110,23 @@ impl Routes {
         answer
     }
 
+    /// Reads the body of a request and carries it out.
+    async fn ordered(&self, path: &str, body: Incoming) -> Response<Answer> {
+        let limited = Limited::new(body, orders::LARGEST as usize);
+        let bytes = match tokio::time::timeout(LONGEST, limited.collect()).await {
+            Ok(Ok(whole)) => whole.to_bytes(),
+            Ok(Err(_)) => return refusal(StatusCode::BAD_REQUEST),
+            Err(_) => return refusal(StatusCode::REQUEST_TIMEOUT),
+        };
+        let (path, watch, desk) = (path.to_string(), self.watch.clone(), self.desk.clone());
+        // A run that is to stop before it goes on may take its time; what has begun is carried out in any case.
+        let done = tokio::task::spawn_blocking(move || orders::carried_out(&path, &bytes, &watch, desk.as_ref())).await;
+        let Ok((status, text)) = done else { return refusal(StatusCode::INTERNAL_SERVER_ERROR) };
+        let mut answer = whole(JSON, text.to_string().into_bytes());
+        *answer.status_mut() = status;
+        answer
+    }
+
     async fn routed(&self, path: &str, query: &str) -> Result<Response<Answer>, StatusCode> {
         if path == "/api/events" {
             return self.events().ok_or(StatusCode::SERVICE_UNAVAILABLE);
@@ -113,6 +136,13 @@ impl Routes {
         }
         let asked = self.asked(path, &Query::new(query))?;
         let watch = self.watch.clone();
+        if matches!(asked, Asked::Run) {
+            let mut found = watch.description();
+            let examples = self.desk.as_ref().map_or(&[][..], Desk::examples);
+            let examples = examples.iter().map(|own| json!({ "name": own.name, "about": own.about }));
+            found["examples"] = examples.collect::<Vec<Value>>().into();
+            return Ok(whole(JSON, found.to_string().into_bytes()));
+        }
         // Reading may wait for the disk; other requests do not.
         let found = tokio::task::spawn_blocking(move || asked.read(&watch)).await;
         let (kind, bytes) = found.unwrap_or(Err(StatusCode::INTERNAL_SERVER_ERROR))?;

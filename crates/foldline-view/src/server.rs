@@ -1,6 +1,7 @@
 //! Local server: one listener on the loopback interface, with limits on everything a client can use up.
 
 use crate::body::{First, first};
+use crate::desk::Desk;
 use crate::gate::Gate;
 use crate::routes::Routes;
 use crate::watch::{Notice, Watch};
@@ -49,15 +50,15 @@ impl Stop {
 }
 
 impl Server {
-    /// Binds a free port.
+    /// Binds a free port. With a desk, the page can go on with a longer study.
     ///
     /// # Errors
     /// If no port can be bound or the operating system supplies no random numbers.
-    pub fn new(watch: Watch) -> io::Result<Server> {
+    pub fn new(watch: Watch, desk: Option<Desk>) -> io::Result<Server> {
         let runtime = Builder::new_current_thread().enable_all().max_blocking_threads(4).build()?;
         let listener = runtime.block_on(TcpListener::bind((Ipv4Addr::LOCALHOST, 0)))?;
         let gate = Gate::new(listener.local_addr()?.port())?;
-        let routes = Arc::new(Routes::new(gate, watch));
+        let routes = Arc::new(Routes::new(gate, watch, desk));
         Ok(Server { runtime, listener, routes, stop: Arc::new(Notify::new()) })
     }
 

@@ -7,6 +7,7 @@ use crate::describe::{described, state};
 use crate::frame::frame;
 use crate::log::{Log, Stretch};
 use crate::orbit::{Place, solution};
+use foldline::diagram::{Kind, Point};
 use foldline::special::quantity::Quantity;
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
@@ -58,14 +59,18 @@ impl std::error::Error for Failure {}
 pub struct Watch(Arc<Shared>);
 
 struct Shared {
-    folder: PathBuf,
     growing: Mutex<Growing>,
     /// Exit code of the process that computes the run, if this program has started it and it has ended.
     code: Mutex<Option<i32>>,
+    /// Reason why the page cannot go on with a longer study.
+    fixed: Mutex<Option<String>>,
 }
 
 struct Growing {
+    folder: PathBuf,
     study: Arc<Study>,
+    /// Number of texts of the study seen.
+    texts: u64,
     quantities: Arc<[Quantity]>,
     /// Number of changes seen.
     version: u64,
@@ -76,6 +81,10 @@ struct Growing {
     stamp: Option<Stamp>,
     seen: Instant,
 }
+
+/// State of a run without a file.
+const NOTHING: &str = "{\"branches\":[],\"special\":[],\"notes\":[],\"responses\":[],\"shortfalls\":[],\
+    \"running\":false,\"code\":null,\"points\":0,\"draft\":true}";
 
 /// Time and size of the file and of its log.
 type Stamp = [Option<(SystemTime, u64)>; 2];
@@ -99,23 +108,56 @@ impl Watch {
         let run = reading.recorded(Part::Special)?;
         let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
         let study = Arc::new(study.map_err(Failure::Study)?);
-        let names = Quantity::names(&study.model);
-        let quantities = names.iter().filter_map(|name| Quantity::named(name, &study.model)).collect();
+        let quantities = quantities_of(&study);
+        let watch = Watch::of(folder, study, quantities);
+        watch.look()?;
+        Ok(watch)
+    }
+
+    /// Study of which nothing has been computed yet; the run will be in a folder.
+    pub fn draft(folder: &Path, study: Study) -> Watch {
+        let quantities = quantities_of(&study);
+        Watch::of(folder, Arc::new(study), quantities)
+    }
+
+    fn of(folder: &Path, study: Arc<Study>, quantities: Arc<[Quantity]>) -> Watch {
         let growing = Growing {
+            folder: folder.to_path_buf(),
             study,
+            texts: 1,
             quantities,
             version: 0,
             log: Log::default(),
-            state: "{}".into(),
+            state: NOTHING.into(),
             written: false,
             code: None,
             stamp: None,
             seen: Instant::now(),
         };
-        let shared = Shared { folder: folder.to_path_buf(), growing: Mutex::new(growing), code: Mutex::new(None) };
-        let watch = Watch(Arc::new(shared));
-        watch.look()?;
-        Ok(watch)
+        let shared = Shared {
+            growing: Mutex::new(growing),
+            code: Mutex::new(None),
+            fixed: Mutex::new(Some("the study of this run is not known here".into())),
+        };
+        Watch(Arc::new(shared))
+    }
+
+    /// Turns to another run, or to another study of which nothing has been computed yet.
+    pub(crate) fn turn_to(&self, folder: &Path, study: Study) {
+        let mut growing = self.growing();
+        growing.folder = folder.to_path_buf();
+        growing.quantities = quantities_of(&study);
+        growing.study = Arc::new(study);
+        growing.texts += 1;
+        growing.version += 1;
+        growing.log.restart();
+        growing.state = NOTHING.into();
+        growing.stamp = None;
+    }
+
+    /// Folder of the run.
+    fn folder(&self) -> PathBuf {
+        self.growing().folder.clone()
     }
 
     /// Notes that the process that computes the run has ended.
@@ -123,14 +165,38 @@ impl Watch {
         *self.0.code.lock().unwrap_or_else(PoisonError::into_inner) = Some(code);
     }
 
+    /// Notes that a process computes the run again.
+    pub(crate) fn started(&self) {
+        *self.0.code.lock().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// Notes whether the page can go on with a longer study, or why it cannot.
+    pub fn editable(&self, can: Result<(), String>) {
+        *self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner) = can.err();
+    }
+
+    /// Reason why the page cannot go on with a longer study, if there is one.
+    pub(crate) fn why_not(&self) -> Option<String> {
+        self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// The study as the run has it.
+    pub fn study(&self) -> Arc<Study> {
+        Arc::clone(&self.growing().study)
+    }
+
     /// Looks for changes. Returns true if something has changed.
     ///
     /// # Errors
     /// If the file cannot be read. What was read before stays available.
     pub(crate) fn look(&self) -> Result<bool, RunFileError> {
-        let written = is_written(&self.0.folder);
+        let folder = self.folder();
+        let written = is_written(&folder);
         let code = *self.0.code.lock().unwrap_or_else(PoisonError::into_inner);
-        let stamp = stamp(&self.0.folder);
+        let stamp = stamp(&folder);
+        if stamp[0].is_none() {
+            return Ok(self.nothing(code));
+        }
         {
             let growing = self.growing();
             let same = growing.stamp == Some(stamp) && growing.written == written && growing.code == code;
@@ -138,28 +204,56 @@ impl Watch {
                 return Ok(false);
             }
         }
-        let reading = Reading::open(&self.0.folder)?;
+        let reading = Reading::open(&folder)?;
         let spans = reading.spans()?;
         let run = reading.recorded(Part::Special)?;
         drop(reading);
         let mut growing = self.growing();
+        if growing.folder != folder {
+            return Ok(false);
+        }
         growing.stamp = Some(stamp);
         growing.seen = Instant::now();
         let before = growing.notice();
         growing.log.grow(&spans);
+        if run.study_text != growing.study.text {
+            let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
+            // The run itself has read this text.
+            if let Ok(study) = study {
+                growing.study = Arc::new(study);
+                growing.texts += 1;
+            }
+        }
         (growing.written, growing.code) = (written, code);
         let study = Arc::clone(&growing.study);
         let mut state = state(run, &spans, &study, &growing.quantities);
         state["running"] = written.into();
         state["code"] = code.into();
         state["points"] = growing.log.points().into();
+        Ok(self.told(&mut growing, state, before))
+    }
+
+    /// The state while there is no run file. Returns true if it has changed.
+    fn nothing(&self, code: Option<i32>) -> bool {
+        let mut growing = self.growing();
+        let before = growing.notice();
+        let mut state: Value = serde_json::from_str(NOTHING).unwrap_or_default();
+        growing.code = code;
+        state["code"] = code.into();
+        self.told(&mut growing, state, before)
+    }
+
+    /// Completes and keeps a state. Returns true if it is another one than `before`.
+    fn told(&self, growing: &mut Growing, mut state: Value, before: Notice) -> bool {
+        state["texts"] = growing.texts.into();
+        state["fixed"] = self.why_not().into();
         let text = state.to_string();
         let changed = *text != *growing.state || before != growing.notice();
         if changed {
             growing.state = text.into();
             growing.version += 1;
         }
-        Ok(changed)
+        changed
     }
 
     pub(crate) fn notice(&self) -> Notice {
@@ -169,7 +263,7 @@ impl Watch {
     /// Model, study and quantities, which do not change while the run grows.
     pub(crate) fn description(&self) -> Value {
         let (study, quantities) = self.about();
-        described(&study, &quantities, &self.0.folder)
+        described(&study, &quantities, &self.folder())
     }
 
     /// Branches, special points, ends and notes.
@@ -203,7 +297,7 @@ impl Watch {
         }
         let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k).copied()).collect();
         let mut found = vec![Vec::new(); 3 + quantities.len()];
-        let reading = Reading::open(&self.0.folder)?;
+        let reading = Reading::open(&self.folder())?;
         for Stretch { branch, reach, .. } in &wanted {
             let before = found[0].len() as u64;
             reading.each_value(*branch, *reach, &quantities, &study.model, |position, unstable, values| {
@@ -227,7 +321,7 @@ impl Watch {
     /// If the file cannot be read.
     pub(crate) fn solution(&self, branch: i64, place: Place) -> Result<Option<Vec<u8>>, RunFileError> {
         let (study, quantities) = self.about();
-        let reading = Reading::open(&self.0.folder)?;
+        let reading = Reading::open(&self.folder())?;
         let point = match place {
             Place::Position(position) => reading.point(branch, position)?,
             Place::Special(index) => reading.special_point(branch, index)?.map(|special| special.point),
@@ -236,6 +330,28 @@ impl Watch {
             let (header, columns) = solution(&study.model, &quantities, &point);
             frame(&header, &columns)
         }))
+    }
+
+    /// Returns a point with the name of its branch, and for a special point its kind and its number among those of its
+    /// kind on the branch; `None` if there is no such point.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn place(&self, branch: i64, place: Place) -> Result<Option<(String, Point, Option<(Kind, usize)>)>, RunFileError> {
+        let reading = Reading::open(&self.folder())?;
+        let Some(span) = reading.spans()?.into_iter().find(|span| span.number == branch) else { return Ok(None) };
+        match place {
+            Place::Position(position) => Ok(reading.point(branch, position)?.map(|point| (span.name, point, None))),
+            Place::Special(index) => {
+                let Some(own) = reading.special_point(branch, index)? else { return Ok(None) };
+                let mut number = 1;
+                for before in 0..index {
+                    let other = reading.special_point(branch, before)?;
+                    number += usize::from(other.is_some_and(|other| other.kind == own.kind));
+                }
+                Ok(Some((span.name, own.point, Some((own.kind, number)))))
+            }
+        }
     }
 
     fn growing(&self) -> MutexGuard<'_, Growing> {
@@ -248,6 +364,11 @@ impl Growing {
         let Growing { version, log, written, .. } = self;
         Notice { epoch: log.epoch(), version: *version, points: log.points(), running: *written }
     }
+}
+
+fn quantities_of(study: &Study) -> Arc<[Quantity]> {
+    let names = Quantity::names(&study.model);
+    names.iter().filter_map(|name| Quantity::named(name, &study.model)).collect()
 }
 
 fn stamp(folder: &Path) -> Stamp {

@@ -12,16 +12,20 @@
 //! * The tables are described in docs/book/run-file.md. `PRAGMA user_version` is [`FORMAT_VERSION`].
 
 mod bytes;
+mod halt;
 mod meta;
 mod reader;
 mod responses;
+mod revised;
 mod rows;
 mod schema;
 mod stream;
 mod view;
 mod writer;
 
+pub use halt::{ask_to_stop, forget_stop, is_asked_to_stop};
 pub use reader::{Part, Reading, Recorded, load, load_part};
+pub use revised::{could_resume, shorten};
 pub(crate) use schema::{Columns, free_name};
 pub use stream::Extent;
 pub use view::{Span, is_written};
@@ -57,6 +61,8 @@ pub enum RunFileError {
     Newer(PathBuf, i64),
     /// A run cannot be resumed because its study or model (named here) has changed.
     Changed(PathBuf, &'static str),
+    /// A run cannot be resumed because its study differs from the one before in more than additions; the text says how.
+    Different(PathBuf, String),
     /// The run is complete and cannot be resumed because part of its profiles were removed.
     Thinned(PathBuf),
     /// The file is inconsistent; the text says where.
@@ -139,6 +145,13 @@ impl fmt::Display for RunFileError {
                 f,
                 "the {what} has changed since the run in {} began\n  help: start a new run with `--out DIR`, or restore the \
                  {what} (the old text is in the table `meta`)",
+                path.display()
+            ),
+            RunFileError::Different(path, why) => write!(
+                f,
+                "the study has changed since the run in {} began: {why}\n  help: a run can go on with a study that has \
+                 more at its end, or more in `switch`; otherwise start a new run with `--out DIR`, or restore the study \
+                 (the old text is in the table `meta`)",
                 path.display()
             ),
             RunFileError::Damaged(path, what) => {

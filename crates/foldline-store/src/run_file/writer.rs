@@ -3,6 +3,7 @@
 use super::bytes::pack;
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
+use super::revised::{lengthen, scales, text};
 use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
@@ -35,6 +36,8 @@ pub struct Recorder {
     /// Number of named columns: parameters and extremes.
     shown: usize,
     store: Store,
+    /// Scales of the states with which the run began.
+    scales: Option<Vec<f64>>,
     /// Number in the table `branches` of each branch that has begun.
     numbers: Mutex<HashMap<String, i64>>,
     /// True if [`State::failure`] is set. Can be read without waiting for the writing thread.
@@ -102,7 +105,7 @@ fn identity(path: &Path) -> Option<Identity> {
 
 /// Locks a file next to the run file for as long as the run writes. The operating system releases the lock when the
 /// process ends for any reason.
-fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
+pub(super) fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
     let path = folder.join("run.lock");
     let open = File::options().create(true).write(true).truncate(false).open(&path);
     let file = open.map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
@@ -168,7 +171,8 @@ impl Recorder {
     }
 
     /// Continues the run in `folder`, or begins one if there is none. Returns the recorder and the diagram found so
-    /// far. Sides that ended only because the run was stopped are open again.
+    /// far. Sides that ended only because the run was stopped are open again. The study may have more at its end than the
+    /// one with which the run began, and is recorded then.
     pub fn resume(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
         let path = path_in(folder);
         if !path.exists() {
@@ -182,16 +186,8 @@ impl Recorder {
             Open::Run(connection) => connection,
         };
         sound(&connection, &path)?;
-        let text = |key: &str| {
-            connection
-                .query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get::<_, String>(0))
-                .map_err(|e| RunFileError::from_sqlite(&path, e))
-        };
-        if text("model")? != study.model_text {
+        if text(&connection, &path, "model")? != study.model_text {
             return Err(RunFileError::Changed(path, "model"));
-        }
-        if text("study")? != study.text {
-            return Err(RunFileError::Changed(path, "study"));
         }
         let thinned = "SELECT count(*) FROM meta WHERE key = ?";
         match connection.query_row(thinned, [THINNED], |row| row.get::<_, i64>(0)) {
@@ -201,6 +197,7 @@ impl Recorder {
         }
         connection.pragma_update(None, "journal_mode", "WAL").map_err(|e| RunFileError::from_sqlite(&path, e))?;
         modernise(&mut connection).map_err(|e| RunFileError::from_sqlite(&path, e))?;
+        lengthen(&mut connection, &path, study)?;
         let mut diagram = load_diagram(&connection, &path, Part::Everything)?;
         let stopped = |end: &mut Option<Ending>| *end = end.take().filter(|ending| *ending != Ending::Stopped);
         diagram.branches.iter_mut().flat_map(|branch| &mut branch.ends).for_each(stopped);
@@ -271,6 +268,7 @@ impl Recorder {
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
             store: study.store,
+            scales: scales(&connection, study),
             numbers: Mutex::new(numbers),
             failed: AtomicBool::new(false),
             waiting: Mutex::default(),
@@ -278,6 +276,11 @@ impl Recorder {
             path,
             _lock: lock,
         })
+    }
+
+    /// Scales of the states `[n]` with which the run began: those of its first study, also when that has grown.
+    pub fn scales(&self) -> Option<&[f64]> {
+        self.scales.as_deref()
     }
 
     /// Closes the file of a complete run and removes the profiles that its study does not keep.

@@ -1,7 +1,7 @@
 //! `[[branch]]`, `[[curve]]` and `[[homotopy]]`, read together in the order of the text, because each starts from
 //! something defined above it.
 
-use super::{branches, curves, homotopies, unique_name};
+use super::{branches, curves, homotopies, near, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::Walk;
 use foldline::diagram::Family;
@@ -60,7 +60,12 @@ impl Ground<'_> {
 }
 
 /// Reads every branch, curve and homotopy of the study.
-pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, seeds: &[(Range<usize>, SeedPlan)]) -> Items {
+pub(super) fn read<'g>(
+    walk: &mut Walk,
+    root: &DeTable,
+    model: &'g Model,
+    seeds: &[(Range<usize>, SeedPlan)],
+) -> Ground<'g> {
     let mut all = Vec::new();
     for what in ["branch", "curve", "homotopy"] {
         all.extend(walk.tables(root, what).into_iter().map(|(span, table)| Item { what, span, table }));
@@ -87,7 +92,7 @@ pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, seeds: &[(Ran
         ground.known.extend(known);
     }
     refuse_names_of_others(walk, &all);
-    ground.items
+    ground
 }
 
 fn known_seed(index: usize, seed: &SeedPlan) -> Known {
@@ -105,7 +110,7 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
 pub(super) fn noun(start: &Start) -> &'static str {
     match start {
         Start::Seed(_) => "seed",
-        Start::EndOf(_) | Start::EndOfSwitched(..) => "branch",
+        Start::EndOf(_) | Start::EndOfSwitched(..) | Start::Near(_) => "branch",
         Start::EndOfCurve(_) => "curve",
         Start::EndOfHomotopy(_) => "homotopy",
     }
@@ -124,6 +129,9 @@ pub(super) fn origin(
         walk.report(item.span.clone(), message, "add `from = \"name of a seed, branch, curve or homotopy\"`");
         return None;
     };
+    if value.get_ref().is_table() {
+        return near::read(walk, item, value, ground, all).map(|(near, at, family)| (Start::Near(near), at, family));
+    }
     let from = walk.string(value, "`from`")?;
     if let Some(known) = ground.known(&from) {
         if known.end.is_none() {

@@ -6,15 +6,21 @@
 //! all mistakes are reported at once, each with position, cause and cure. The format is described in
 //! docs/book/study-files.md.
 
+mod append;
 mod branches;
 mod curves;
 mod explorations;
+mod grown;
 mod holds;
 mod homotopies;
 mod items;
+mod near;
 mod profiles;
 mod responses;
 mod seeds;
+
+pub use append::{Action, Appended, Place, Refusal, append};
+pub use grown::{Added, added};
 
 use crate::diagnostic::Diagnostic;
 use crate::finite::{check_explorations, check_seeds};
@@ -228,13 +234,14 @@ fn parse(
     let spreads = spreads(&mut walk, &root, &model);
     let uncertainty = root.get("uncertainty").is_some_and(|value| uncertainty(&mut walk, value, &spreads));
     let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
-    let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
+    let ground = items::read(&mut walk, &root, &model, &seeds);
+    let Items { branches, curves, homotopies } = &ground.items;
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
     let items = items.chain(homotopies.iter().map(|h| &h.name)).map(String::as_str);
     let taken: Vec<&str> = seeds.iter().map(|(_, s)| s.name.as_str()).chain(items).collect();
     let surveys = responses::surveys(&mut walk, &root, &model, &defaults, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(surveys.iter().map(|s| s.name.as_str())).collect();
-    let sweeps = responses::sweeps(&mut walk, &root, &model, &seeds, &taken);
+    let sweeps = responses::sweeps(&mut walk, &root, &ground, &seeds, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
     let explorations = explorations::read(&mut walk, &root, &model, &defaults, &taken);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
@@ -247,6 +254,7 @@ fn parse(
     if !walk.found.is_empty() {
         return Err(walk.found);
     }
+    let Items { branches, curves, homotopies } = ground.items;
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
     let plan = Plan {
         tolerance,

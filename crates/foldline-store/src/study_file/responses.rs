@@ -1,11 +1,11 @@
 //! `[[survey]]` and `[[sweep]]`: simulations.
 
 use super::branches::free;
-use super::items::Item;
-use super::{override_parameters, unique_name};
+use super::items::{Ground, Item};
+use super::{near, override_parameters, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
-use foldline::explore::{SeedPlan, SurveyPlan, SweepPlan};
+use foldline::explore::{SeedPlan, Start, SurveyPlan, SweepPlan};
 use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
@@ -48,38 +48,50 @@ pub(super) fn surveys(
 pub(super) fn sweeps(
     walk: &mut Walk,
     root: &DeTable,
-    model: &Model,
+    ground: &Ground,
     seeds: &[(Range<usize>, SeedPlan)],
     taken: &[&str],
 ) -> Vec<SweepPlan> {
+    let model = ground.model;
     let mut sweeps: Vec<SweepPlan> = Vec::new();
     for (span, table) in walk.tables(root, "sweep") {
         walk.only(table, &SWEEP_KEYS, "a sweep");
         let own = sweeps.iter().map(|s| s.name.as_str());
         let name = unique_name(walk, table, &span, "sweep", &taken.iter().copied().chain(own).collect::<Vec<_>>());
-        let seed = seed(walk, table, &span, seeds);
+        let start = start(walk, table, &span, ground, seeds);
         let free = free(walk, &Item { what: "sweep", span: span.clone(), table }, model);
         let values = values(walk, table, &span, ("sweep", unit_of(free, model)), false);
-        let (Some(name), Some(seed), Some(free), Some(values)) = (name, seed, free, values) else { continue };
-        sweeps.push(SweepPlan { name, seed, free, values });
+        let (Some(name), Some(start), Some(free), Some(values)) = (name, start, free, values) else { continue };
+        sweeps.push(SweepPlan { name, start, free, values });
     }
     sweeps
 }
 
-fn seed(walk: &mut Walk, table: &DeTable, span: &Range<usize>, seeds: &[(Range<usize>, SeedPlan)]) -> Option<usize> {
+/// Reads the start of a sweep: a seed, or a point of a branch.
+fn start(
+    walk: &mut Walk,
+    table: &DeTable,
+    span: &Range<usize>,
+    ground: &Ground,
+    seeds: &[(Range<usize>, SeedPlan)],
+) -> Option<Start> {
     let Some(value) = table.get("from") else {
         let message = "this sweep has no `from`, its starting seed";
         walk.report(span.clone(), message, "add `from = \"name of a seed\"`");
         return None;
     };
+    if value.get_ref().is_table() {
+        let item = Item { what: "sweep", span: span.clone(), table };
+        return near::read(walk, &item, value, ground, &[]).map(|(near, ..)| Start::Near(near));
+    }
     let from = walk.string(value, "`from`")?;
     let found = seeds.iter().position(|(_, seed)| seed.name == from);
     if found.is_none() {
         let names: Vec<&str> = seeds.iter().map(|(_, seed)| seed.name.as_str()).collect();
-        let message = format!("there is no seed \"{from}\"; a sweep starts from a seed");
+        let message = format!("there is no seed \"{from}\"; a sweep starts from a seed, or from a point of a branch");
         walk.report(value.span(), message, suggest(&from, &names));
     }
-    found
+    found.map(Start::Seed)
 }
 
 /// Returns the unit of the free parameter.

@@ -4,16 +4,16 @@ use foldline::diagram::Diagram;
 use foldline::explore;
 use foldline_store::run_file::{Recorder, load};
 use foldline_store::study_file::{Study, parse_study};
-use foldline_view::{Server, Stop, Watch};
+use foldline_view::{Desk, Server, Stop, Watch};
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::path::Path;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-const MODEL: &str =
+pub const MODEL: &str =
     "name = \"pitchfork\"\n[parameters]\nmu = 1.0\n[states.x]\nequation = \"mu*x - x^3\"\n[outputs]\nr = \"abs(x)\"\n";
-const STUDY: &str = "model = \"pitchfork.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 1 }\n\
+pub const STUDY: &str = "model = \"pitchfork.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 1 }\n\
     [[branch]]\nname = \"main\"\nfrom = \"start\"\nfree = \"mu\"\nrange = [0.5, 2]\n";
 
 /// Time after which a test fails. Nothing is expected to take that long.
@@ -42,8 +42,13 @@ pub struct Served {
 }
 
 impl Served {
+    #[allow(dead_code)]
     pub fn new(folder: &Path) -> Served {
-        let server = Server::new(Watch::open(folder).expect("there is a run")).expect("a port is free");
+        Served::of(Watch::open(folder).expect("there is a run"), None)
+    }
+
+    pub fn of(watch: Watch, desk: Option<Desk>) -> Served {
+        let server = Server::new(watch, desk).expect("a port is free");
         let address = server.address();
         let rest = address.strip_prefix("http://127.0.0.1:").expect("the server is on this computer");
         let (port, token) = rest.split_once("/?token=").expect("the address has a token");

@@ -2,9 +2,9 @@
 
 use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
-use super::plan::{BranchPlan, Holds, Plan, Start, Switching};
+use super::plan::{BranchPlan, Holds, Near, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, arrival, connections, crossings, curves, discovery, holds, homotopy, known, switch};
+use super::{System, arrival, connections, crossings, curves, discovery, holds, homotopy, known, near, switch};
 use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
@@ -45,8 +45,12 @@ pub fn weight(plan: &Plan, root: Root) -> usize {
             let switched: usize = depths.map(|depth| (1 << depth.min(8)) - 1).sum();
             let curves = (0..plan.curves.len()).filter(|&i| plan.curves[i].of == branch.name);
             let starts = plan.branches.iter().map(|b| &b.start).chain(plan.homotopies.iter().map(|h| &h.start));
-            let behind =
-                starts.filter(|start| matches!(start, Start::EndOfSwitched(from, _) if *from == index)).count();
+            let behind = |start: &&Start| match start {
+                Start::EndOfSwitched(from, _) => *from == index,
+                Start::Near(near) => near.branch == index,
+                _ => false,
+            };
+            let behind = starts.filter(behind).count();
             1 + switched
                 + behind
                 + following(Start::EndOf(index))
@@ -131,6 +135,32 @@ impl Work<'_> {
         self.curves(first..last)
             && self.after(Start::EndOf(index), &plan.name, ended)
             && self.after_switched(index, first..last)
+            && self.after_inside(index, first..last)
+    }
+
+    /// Follows the branches and homotopies that start at points inside a branch and those switched to from it.
+    fn after_inside(&mut self, index: usize, grown: Range<usize>) -> bool {
+        let plan = self.plan;
+        let of_this = |start: &Start| match start {
+            Start::Near(near) if near.branch == index => Some(near.clone()),
+            _ => None,
+        };
+        let branches = plan.branches.iter().enumerate().filter_map(|(i, own)| Some((i, of_this(&own.start)?, false)));
+        let homotopies = plan.homotopies.iter().enumerate();
+        let homotopies = homotopies.filter_map(|(i, own)| Some((i, of_this(&own.start)?, true)));
+        let all: Vec<(usize, Near, bool)> = branches.chain(homotopies).collect();
+        all.into_iter().all(|(next, near, is_homotopy)| {
+            let parent = self.branches[grown.clone()].iter().find(|branch| branch.name == near.name);
+            let point = parent.map_or_else(
+                || Err(format!("no switch led to a branch {}", near.name)),
+                |parent| near::point_of(self.system, plan, &near, parent, self.observer),
+            );
+            let origin = near::origin(&near, parent, &point);
+            match is_homotopy {
+                true => self.brought(next, origin, point),
+                false => self.planned(next, origin, point),
+            }
+        })
     }
 
     /// Follows the branches and homotopies that start at the ends of switched branches.
@@ -348,6 +378,7 @@ impl Work<'_> {
             // Branch switching checks whether a branch is known by comparison with the points of all.
             sparse: self.observer.stores()
                 && self.plan.explorations.is_empty()
+                && !self.plan.starts_inside()
                 && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
         }
     }

@@ -20,6 +20,7 @@
 //! | is this branch known already? | [`known`] |
 //! | how does a special point move when a second parameter changes? | [`curves`] |
 //! | how is a family carried to other parameter values? | [`homotopy`] |
+//! | which point of a branch has given values? | `near` |
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | what does simulation find? | [`responses`] |
 
@@ -49,6 +50,7 @@ pub mod known;
 mod lookout;
 mod maps;
 mod minimal;
+mod near;
 pub mod persistence;
 pub mod plan;
 mod profile;
@@ -74,7 +76,7 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
+    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
     SweepPlan, Switching,
 };
 pub use seeds::{attractors, first_solution};
@@ -134,7 +136,7 @@ pub fn run_from(
         (1..jobs.min(families.len().max(seeds.count()))).for_each(|_| drop(scope.spawn(work)));
         work();
     });
-    let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
-    let responses = responses::simulate(system, plan, &seeds, jobs, &earlier, observer);
+    let branches: Vec<Branch> = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
+    let responses = responses::simulate(system, plan, &seeds, jobs, &branches, &earlier, observer);
     Diagram { branches, responses, shortfalls: observer.shortfalls() }
 }

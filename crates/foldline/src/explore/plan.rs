@@ -47,7 +47,7 @@ pub struct SeedPlan {
 }
 
 /// Start of a branch.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Start {
     /// At the seed of that index.
     Seed(usize),
@@ -59,6 +59,19 @@ pub enum Start {
     EndOfCurve(usize),
     /// At the goal of the homotopy of that index.
     EndOfHomotopy(usize),
+    /// At a point of a branch.
+    Near(Near),
+}
+
+/// Point of a branch, given by values that it has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Near {
+    /// Index of the branch of the plan on which the point lies, or from which the plan switches to its branch.
+    pub branch: usize,
+    /// Name of its branch.
+    pub name: String,
+    /// Values of quantities, to which it is the closest point.
+    pub levels: Vec<Level>,
 }
 
 /// Special points at which to switch branches, and depth.
@@ -222,8 +235,8 @@ pub struct SurveyPlan {
 pub struct SweepPlan {
     /// Unique name.
     pub name: String,
-    /// Index of the seed at which it starts.
-    pub seed: usize,
+    /// Its start: a seed, or a point of a branch.
+    pub start: Start,
     /// Index of the parameter that varies.
     pub free: usize,
     /// Its values, in the order in which they are visited.
@@ -260,6 +273,14 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// True if anything starts at a point inside a branch.
+    pub fn starts_inside(&self) -> bool {
+        let branches = self.branches.iter().map(|branch| &branch.start);
+        let homotopies = self.homotopies.iter().map(|homotopy| &homotopy.start);
+        let all = branches.chain(homotopies).chain(self.sweeps.iter().map(|sweep| &sweep.start));
+        all.into_iter().any(|start| matches!(start, Start::Near(_)))
+    }
+
     /// Returns a plan without requests.
     pub fn empty(tolerance: f64, degree: usize) -> Plan {
         Plan {

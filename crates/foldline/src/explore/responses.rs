@@ -4,22 +4,24 @@
 //! shared as a whole. Results completed by an earlier run are not computed again. Jumps of a sweep are detected by
 //! solving for its motions (`pursuit`).
 
-use super::System;
-use super::plan::{Plan, SurveyPlan, SweepPlan};
+use super::{System, near};
+use super::plan::{Plan, Start, SurveyPlan, SweepPlan};
 use super::pursuit::Pursuit;
 use super::seeds::{Seeds, sampling};
 use crate::attractors::{Candidate, Trial, stepped_sweep, survey_by_simulation};
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Diagram, Motion, Response, Responses, Search, Solution};
+use crate::diagram::{Branch, Diagram, Motion, Point, Response, Responses, Search, Solution};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Returns the responses of every completed survey and sweep of the plan, in the order of the plan.
+/// Returns the responses of every completed survey and sweep of the plan, in the order of the plan. `branches` are those
+/// from which sweeps may start.
 pub fn simulate(
     system: &System,
     plan: &Plan,
     seeds: &Seeds<'_>,
     jobs: usize,
+    branches: &[Branch],
     earlier: &Diagram,
     observer: &dyn Observer,
 ) -> Vec<Responses> {
@@ -39,7 +41,7 @@ pub fn simulate(
                     plan.sweeps.get(index).zip(swept.get(index))
                 } {
                     let known = earlier.response_set(&sweep.name).cloned();
-                    let set = known.or_else(|| one_sweep(system, plan, sweep, seeds, observer));
+                    let set = known.or_else(|| one_sweep(system, plan, sweep, seeds, branches, observer));
                     if let Ok(mut slot) = slot.lock() {
                         *slot = set;
                     }
@@ -113,31 +115,55 @@ fn escapes(responses: &[Response], starts: usize) -> Option<String> {
     (!gone.is_empty()).then(|| format!("starts that escaped (of {starts}): {}{more}", told.join(", ")))
 }
 
+/// Solution at which a sweep starts.
+fn first(
+    system: &System,
+    plan: &Plan,
+    start: &Start,
+    seeds: &Seeds<'_>,
+    branches: &[Branch],
+    observer: &dyn Observer,
+) -> Result<Point, String> {
+    match start {
+        Start::Seed(seed) => seeds.point(*seed),
+        Start::Near(near) => {
+            let branch = branches.iter().find(|branch| branch.name == near.name);
+            let branch = branch.ok_or_else(|| format!("there is no branch {}", near.name))?;
+            near::point_of(system, plan, near, branch, observer)
+        }
+        _ => Err("a sweep starts at a seed or at a point of a branch".to_string()),
+    }
+}
+
 fn one_sweep(
     system: &System,
     plan: &Plan,
     sweep: &SweepPlan,
     seeds: &Seeds<'_>,
+    branches: &[Branch],
     observer: &dyn Observer,
 ) -> Option<Responses> {
-    let SweepPlan { name, seed, free, values } = sweep;
-    let point = match seeds.point(*seed) {
+    let SweepPlan { name, start, free, values } = sweep;
+    let point = match first(system, plan, start, seeds, branches, observer) {
         Ok(point) => point,
         Err(why) => {
             observer.observe(Event::Short(name, &format!("no starting solution: {why}")));
             return None;
         }
     };
-    let start = match &point.solution {
+    let state = match &point.solution {
         Solution::Equilibrium(x) => x.clone(),
         Solution::Cycle(cycle) => cycle.state(0.0),
     };
-    let parameters = plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters);
+    let parameters = match start {
+        Start::Seed(seed) => plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters),
+        _ => &point.parameters,
+    };
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
     let report = |found: &[Response]| count.visited(found);
     let mut pursuit = Pursuit::new(system, *free, plan.tolerance, plan.degree);
     let mut compare = |own: &[f64], candidate: Option<&Candidate>| pursuit.leaves(own, candidate);
-    let responses = stepped_sweep(&trial(system, plan, 1), parameters, *free, values, &start, &mut compare, &report);
+    let responses = stepped_sweep(&trial(system, plan, 1), parameters, *free, values, &state, &mut compare, &report);
     if observer.stopping() {
         return None;
     }

@@ -55,7 +55,7 @@ impl<'p> Seeds<'p> {
             let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
             let first_legs = plan.homotopies.iter().filter(|h| h.start == start).map(|h| format!("{}/1", h.name));
             branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
-                || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
+                || plan.sweeps.iter().any(|sweep| sweep.start == start && earlier.response_set(&sweep.name).is_none())
         };
         let known = |seed: usize| given.iter().any(|(index, _)| *index == seed);
         let needed: Vec<bool> = (0..plan.seeds.len()).map(|seed| needed(seed) && !known(seed)).collect();

@@ -115,6 +115,13 @@ impl<'a> System<'a> {
         common
     }
 
+    /// Returns the system of a model with these scales of its states `[n]`: those with which a run began that goes on
+    /// with a longer plan.
+    pub fn scaled(self, model: &Model, scales: &[f64]) -> System<'a> {
+        let ranges = model.states.iter().zip(scales).map(|(state, scale)| state.range_at(*scale)).collect();
+        System { scales: scales.to_vec(), ranges, ..self }
+    }
+
     /// True for a boundary-value problem.
     pub fn is_open(&self) -> bool {
         self.field.conditions() != [0, 0]

@@ -216,7 +216,7 @@ fn a_given_profile_of_several_turns_starts_a_branch_of_one() {
 fn swept(model: &Model, parameters: &[f64], values: Vec<f64>) -> (Vec<f64>, Vec<Option<bool>>) {
     let start =
         SeedPlan { parameters: parameters.to_vec(), ..seed(SeedSource::Attractor(AttractorKey::Cycle), &[], 8) };
-    let sweep = SweepPlan { name: "up".into(), seed: 0, free: 0, values: values.clone() };
+    let sweep = SweepPlan { name: "up".into(), start: Start::Seed(0), free: 0, values: values.clone() };
     let plan = Plan { seeds: vec![start], sweeps: vec![sweep], ..Plan::empty(1e-6, 4) };
     let found = run(&System::of_plan(model, &plan), &plan, 1, Diagram::default(), &Unobserved).responses.remove(0);
     let jumped = found.responses.iter().map(|response| response.jumped).collect();
