@@ -66,6 +66,7 @@ mod tests;
 #[cfg(test)]
 mod tests_identity;
 pub mod together;
+pub mod tori;
 
 pub use axis::axis_of;
 pub(crate) use corner::SLIDING;

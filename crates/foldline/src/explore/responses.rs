@@ -131,6 +131,7 @@ fn one_sweep(
     let start = match &point.solution {
         Solution::Equilibrium(x) => x.clone(),
         Solution::Cycle(cycle) => cycle.state(0.0),
+        Solution::Torus(torus) => torus.state(0.0, 0.0),
     };
     let parameters = plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters);
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
