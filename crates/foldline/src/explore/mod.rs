@@ -67,6 +67,7 @@ mod tests;
 mod tests_identity;
 pub mod together;
 pub mod tori;
+mod unforced;
 
 pub use axis::axis_of;
 pub(crate) use corner::SLIDING;

@@ -5,7 +5,10 @@
 
 use super::System;
 use super::growth::{Beginning, setting};
+use super::plan::{Plan, SeedPlan, SeedSource};
+use super::seeds::first_of;
 use super::switch::{DISTANCES, joined, step_off};
+use super::unforced::{Unforced, acts};
 use crate::continuation::{Settings, Station};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cycle, Point, Solution, SpecialPoint};
@@ -81,4 +84,38 @@ pub(super) fn born(
 fn strong_resonance(z: Complex64) -> Option<u32> {
     const CLOSE: f64 = 2e-3;
     (1..=4).find(|order| (z.powu(*order) - 1.0).norm() < CLOSE * f64::from(*order))
+}
+
+/// The torus that a cycle is, at parameters at which the forcing does not act: the cycle is found without forcing, from
+/// the source of the seed.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub(super) fn lifted(
+    system: &System,
+    plan: &Plan,
+    seed: &SeedPlan,
+    source: &SeedSource,
+    jobs: usize,
+) -> Result<Point, String> {
+    if let Some(why) = unsupported(system) {
+        return Err(why.into());
+    }
+    if !system.field.forced() {
+        return Err("a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into());
+    }
+    if acts(system.field, &seed.parameters, &system.ranges) {
+        return Err("the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
+                    not act, so set its amplitude to zero there"
+            .into());
+    }
+    let field = Unforced(system.field);
+    let alone = System { field: &field, ..system.clone() };
+    let own = SeedPlan { source: source.clone(), ..seed.clone() };
+    let point = first_of(&alone, own, plan, jobs)?;
+    let Solution::Cycle(cycle) = &point.solution else {
+        return Err("without the forcing the seed leads to an equilibrium, on which the forcing causes a cycle".into());
+    };
+    let torus = start::lifted(cycle, system.field.time_unit(&seed.parameters));
+    Ok(Point { solution: Solution::Torus(torus), tangent: Vec::new(), ..point })
 }

@@ -26,7 +26,7 @@ mod special;
 mod tests;
 mod variational;
 
-use crate::diagram::{Branch, Diagram, Kind, Solution};
+use crate::diagram::{Branch, Diagram, Family, Kind, Solution};
 use crate::explore::{System, axis_of};
 use crate::problem::{Axis, Setting};
 
@@ -177,8 +177,12 @@ pub fn verify(
         let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
-        if system.is_open() {
-            let why = "solutions of boundary-value problems are not recomputed yet";
+        let tori = branch.family == Family::Torus;
+        if system.is_open() || tori {
+            let why = match tori {
+                true => "tori are not recomputed yet",
+                false => "solutions of boundary-value problems are not recomputed yet",
+            };
             let undecided = |position: i64, special: Option<Kind>| Undecided {
                 branch: branch.name.clone(),
                 position,
