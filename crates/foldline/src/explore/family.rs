@@ -383,7 +383,8 @@ impl Work<'_> {
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
             let below = pending.switching.below(special.kind, counts[slot]);
             let leaving = Leaving { plan, settings: &settings, parent: &parent, special, label, below };
-            let kernel = if special.kind == Kind::BranchPoint { special.kernel() } else { 1 };
+            let of_torus = matches!(special.point.solution, Solution::Torus(_));
+            let kernel = if special.kind == Kind::BranchPoint && !of_torus { special.kernel() } else { 1 };
             let going = match kernel {
                 1 => self.left(&leaving, name, &mut more),
                 _ => self.left_in_all_directions(&leaving, &name, kernel, &mut more),

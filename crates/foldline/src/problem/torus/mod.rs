@@ -213,6 +213,9 @@ impl ZeroProblem for TorusProblem<'_> {
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
+        if self.directions.is_empty() {
+            self.anchor(u);
+        }
         let (n, size) = (self.n, self.profile_size());
         let block = (self.scheme.degree + 1) * n;
         let [table, _] = phases::shift(self.phases, u[size + 1]);
@@ -240,6 +243,9 @@ impl ZeroProblem for TorusProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        if self.directions.is_empty() {
+            self.anchor(u);
+        }
         let (count, size) = (self.phases, self.profile_size());
         let profiles: Vec<&[f64]> = self
             .directions
