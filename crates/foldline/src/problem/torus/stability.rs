@@ -3,7 +3,7 @@
 //! **Idea.** Perturbations of the closed curve are carried over a period by the transition matrices and turned back by ρ:
 //! a linear operator. With an eigenvector v(φ) and eigenvalue μ, v(φ) exp(2πi j φ) is one too, with μ exp(-2πi j ρ), so that
 //! the spectrum lies on n circles. The radius of each is the factor of growth per period; one eigenvector of each family
-//! represents it, the one that varies least with the phase.
+//! represents it.
 //!
 //! **Equations.** With G_k the transition matrix of segment k:
 //!
@@ -13,7 +13,8 @@
 //!   (3)  Σ log |μ| over the n families = mean of ∫ tr f_x dt
 //! ```
 //!
-//! Eigenvectors of frequency near zero are resolved best; those of high frequency are not resolved at all. One family
+//! A family is represented by the eigenvector whose mean frequency (2) lies between -1/2 and 1/2. Eigenvectors with high
+//! harmonics are not resolved, and are told by their mean square. One family
 //! (two without forcing) is trivial, with μ = 1. The defects of the trivial ones and of (3) are stated with the point.
 //!
 //! **Source.** jorba2001.
@@ -31,6 +32,8 @@ use std::f64::consts::TAU;
 
 /// Ratio of the stated to the estimated error of multipliers.
 const SAFE: f64 = 4.0;
+/// Rounding of a mean frequency of one half.
+const HALF: f64 = 1e-6;
 /// Error of a multiplier by rounding.
 const ROUNDING: f64 = 1e-11;
 
@@ -83,18 +86,20 @@ impl TorusProblem<'_> {
             }
         }
         let (values, vectors) = foldline_general::eigenvectors(operator.as_ref())?;
-        let frequencies = self.mean_frequencies(&vectors);
+        let frequencies = self.frequencies(&vectors);
+        // Of each family the members about frequency zero; those of high frequency are not resolved, and mix.
+        let class = |at: usize| frequencies[at][0].abs() > 0.5 + HALF;
         let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|a, b| frequencies[*a].abs().total_cmp(&frequencies[*b].abs()));
+        order.sort_by(|a, b| class(*a).cmp(&class(*b)).then(frequencies[*a][1].total_cmp(&frequencies[*b][1])));
         Some(order[..n].iter().map(|at| values[*at]).collect())
     }
 
-    /// (2) of every eigenvector, by the rate of change along the phase.
-    fn mean_frequencies(&self, vectors: &Mat<Complex64>) -> Vec<f64> {
+    /// (2) of every eigenvector, by the rate of change along the phase, and the mean square.
+    fn frequencies(&self, vectors: &Mat<Complex64>) -> Vec<[f64; 2]> {
         let (n, count) = (self.n, self.phases);
         let [_, rate] = phases::shift(count, 0.0);
         let change: Mat<f64> = Mat::from_fn(count, count, |k, l| rate[(k + count - l) % count]);
-        let (mut sums, mut norms) = (vec![0.0; vectors.ncols()], vec![0.0; vectors.ncols()]);
+        let (mut sums, mut norms) = (vec![[0.0; 2]; vectors.ncols()], vec![0.0; vectors.ncols()]);
         for c in 0..n {
             let part = |of: fn(&Complex64) -> f64| Mat::from_fn(count, vectors.ncols(), |k, v| of(&vectors[(k * n + c, v)]));
             let (real, imaginary) = (part(|z| z.re), part(|z| z.im));
@@ -102,11 +107,13 @@ impl TorusProblem<'_> {
             for v in 0..vectors.ncols() {
                 for k in 0..count {
                     let (x, y) = (real[(k, v)], imaginary[(k, v)]);
-                    sums[v] += x * by_imaginary[(k, v)] - y * by_real[(k, v)];
+                    let (dx, dy) = (by_real[(k, v)], by_imaginary[(k, v)]);
+                    sums[v][0] += x * dy - y * dx;
+                    sums[v][1] += (dx * dx + dy * dy) / TAU;
                     norms[v] += x * x + y * y;
                 }
             }
         }
-        sums.iter().zip(&norms).map(|(sum, norm)| sum / (TAU * norm)).collect()
+        sums.iter().zip(&norms).map(|(sum, norm)| sum.map(|sum| sum / (TAU * norm))).collect()
     }
 }
