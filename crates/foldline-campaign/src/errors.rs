@@ -43,7 +43,7 @@ pub fn sampled(system: &System, settings: &Settings, branch: &Branch, count: usi
     // Near an orbit of infinite period, a mesh for a thousandth of the tolerance would be too large.
     let reachable = |point: &&Point| match &point.solution {
         Solution::Cycle(cycle) => !point.tangent.is_empty() && cycle.intervals() < MOST,
-        Solution::Equilibrium(_) => false,
+        Solution::Equilibrium(_) | Solution::Torus(_) => false,
     };
     for point in chosen.filter(reachable) {
         let mut problem = problem_of(system, branch.free, DEGREE, point, false);

@@ -129,6 +129,7 @@ fn family(point: &Point) -> Family {
     match point.solution {
         Solution::Equilibrium(_) => Family::Equilibrium,
         Solution::Cycle(_) => Family::Cycle,
+        Solution::Torus(_) => Family::Torus,
     }
 }
 

@@ -68,6 +68,7 @@ fn line(attractor: &Attractor, model: &Model) -> String {
     let point = &attractor.point;
     let (kind, period) = match &point.solution {
         Solution::Equilibrium(_) => ("equilibrium", "·".to_string()),
+        Solution::Torus(torus) => ("torus", format!("{:.9}", Shown(torus.period))),
         Solution::Cycle(cycle) => {
             // In an autonomous model the whirl plane may turn with the shaft.
             let sense = model.whirl.filter(|_| model.forced()).and_then(|whirl| whirl_sense(cycle, whirl));

@@ -147,6 +147,7 @@ fn table(found: &Basins, model: &Model, with_plane: bool) -> Table {
         let period = match &attractor.point.solution {
             Solution::Equilibrium(_) => Cell::Empty,
             Solution::Cycle(cycle) => Cell::Number(cycle.period),
+            Solution::Torus(torus) => Cell::Number(torus.period),
         };
         row(name(found, number, model.iterated()), period, Fate::Settled(number))
     });

@@ -25,6 +25,7 @@ pub fn name(basins: &Basins, number: usize, map: bool) -> String {
     let attractor = &basins.attractors[number];
     match (&attractor.point.solution, attractor.ratio) {
         (Solution::Equilibrium(_), _) => format!("equilibrium {}", number + 1),
+        (Solution::Torus(_), _) => format!("torus {}", number + 1),
         (Solution::Cycle(_), Some((a, b))) => format!("cycle {}, {a}:{b}", number + 1),
         (Solution::Cycle(cycle), None) if map && cycle.period == 1.0 => format!("fixed point {}", number + 1),
         (Solution::Cycle(cycle), None) => format!("cycle {}, period {:.4}", number + 1, cycle.period),
@@ -68,6 +69,10 @@ pub fn svg(basins: &Basins, plane: &Plane, model: &Model, map: bool) -> String {
         let at = |state: &[f64]| [state[plane.axes[0]], state[plane.axes[1]]];
         layers.push(match &attractor.point.solution {
             Solution::Equilibrium(state) => Layer::scatter(vec![at(state)], Marker::Circle, palette::BLACK),
+            Solution::Torus(torus) => {
+                let states = torus.grid(41, 41);
+                Layer::scatter(states.chunks_exact(plane.through.len()).map(at).collect(), Marker::Circle, palette::BLACK)
+            }
             Solution::Cycle(cycle) if map => {
                 let states = cycle.profile.chunks_exact(plane.through.len());
                 Layer::scatter(states.map(at).collect(), Marker::Circle, palette::BLACK)

@@ -45,6 +45,7 @@ impl Solution {
         match self.point.solution {
             diagram::Solution::Equilibrium(_) => "equilibrium",
             diagram::Solution::Cycle(_) => "cycle",
+            diagram::Solution::Torus(_) => "torus",
         }
     }
 
@@ -80,6 +81,7 @@ impl Solution {
         let state = match &self.point.solution {
             diagram::Solution::Equilibrium(x) => &x[..],
             diagram::Solution::Cycle(cycle) => cycle.profile.get(..self.model.dim()).unwrap_or(&[]),
+            diagram::Solution::Torus(torus) => torus.profile.get(..self.model.dim()).unwrap_or(&[]),
         };
         numbers(py, state.iter().copied())
     }

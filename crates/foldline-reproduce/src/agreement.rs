@@ -239,6 +239,7 @@ impl Context<'_> {
         let solution = match &known.point.solution {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
+            Solution::Torus(torus) => torus.state(0.0, 0.0),
         };
         let mut seen = Seen::Never;
         // Near its birth or a period doubling, a cycle has a very narrow basin.

@@ -29,13 +29,17 @@ pub(crate) fn check_seeds(
     model_file: &str,
 ) {
     for (span, seed) in seeds {
-        let failing = match &seed.source {
+        let source = match &seed.source {
+            SeedSource::Torus(source) => source,
+            source => source,
+        };
+        let failing = match source {
             SeedSource::State(state) => not_finite(model, state, &seed.parameters).map(|c| (c, state.clone())),
             SeedSource::Cycle(cycle) => {
                 let state = &cycle.profile[..cycle.dim()];
                 not_finite(model, state, &seed.parameters).map(|c| (c, state.to_vec()))
             }
-            SeedSource::Attractor(_) => failing_everywhere(model, &seed.parameters),
+            SeedSource::Attractor(_) | SeedSource::Torus(_) => failing_everywhere(model, &seed.parameters),
         };
         let Some((component, state)) = failing else { continue };
         let message = complaint(model, component, &state, &seed.parameters);

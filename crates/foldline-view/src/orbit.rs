@@ -21,6 +21,8 @@ pub(crate) enum Place {
     Special(i64),
 }
 
+/// Periods of a torus over which a trajectory is shown.
+const ROUNDS: usize = 40;
 /// Number of places at which an orbit is evaluated, about, for a picture that looks smooth at full screen.
 const PLACES: usize = 600;
 /// Number of samples for harmonics.
@@ -61,6 +63,25 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
             let samples = channels(model, &point.parameters, cycle.uniform(SAMPLES), &clock);
             columns.extend(samples.iter().flat_map(|column| transform(column)));
             (times, HIGHEST + 1, columns)
+        }
+        Solution::Torus(torus) if point.solution.is_stored() => {
+            // One trajectory on the torus, which does not close.
+            header["period"] = (ROUNDS as f64 * torus.period).into();
+            let count = ROUNDS * 48;
+            let times: Vec<f64> = (0..count).map(|k| k as f64 / count as f64).collect();
+            let place = |time: &f64| (ROUNDS as f64 * time).floor();
+            let states = times.iter().flat_map(|time| {
+                torus.state(torus.rotation * place(time), ROUNDS as f64 * time - place(time))
+            });
+            let forcing = f64::from(torus.forcing_periods) * ROUNDS as f64;
+            let clock: Vec<f64> = times.iter().map(|time| time * forcing).collect();
+            let columns = channels(model, &point.parameters, states.collect(), &clock);
+            (times, 0, columns)
+        }
+        Solution::Torus(torus) => {
+            header["period"] = torus.period.into();
+            header["removed"] = true.into();
+            (Vec::new(), 0, Vec::new())
         }
         Solution::Cycle(cycle) => {
             header["period"] = cycle.period.into();

@@ -171,6 +171,11 @@ impl Conversion {
                 let n = self.model.states.len().max(1);
                 cycle.profile.chunks_mut(n).for_each(|state| self.states(state, &at));
             }
+            Solution::Torus(torus) => {
+                torus.period = self.time.of(torus.period, &at);
+                let n = self.model.states.len().max(1);
+                torus.profile.chunks_mut(n).for_each(|state| self.states(state, &at));
+            }
         }
     }
 

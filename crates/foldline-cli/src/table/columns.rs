@@ -27,6 +27,7 @@ pub fn special(
     columns.extend(end_columns(model));
     columns.extend(output_columns(model));
     columns.extend(recorded_columns(record, model));
+    columns.extend(torus_columns(diagram, kept));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
     columns.push(column("normal_form", Style::Word));
@@ -37,6 +38,7 @@ pub fn special(
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Word(special.kind.name().into())];
         row.extend(place_cells(&special.point, model));
         row.extend(recorded_cells(&special.point, record, model));
+        row.extend(torus_cells(&special.point, diagram, kept));
         let unstable = [special.unstable_before, special.unstable_after].map(|number| match branch.family {
             Family::Arc => Cell::Empty,
             _ => count(number),
@@ -79,6 +81,7 @@ pub fn points(
     let channels = outputs.chain(model.states.iter().map(|s| (&s.name, &s.unit)));
     columns.extend(channels.flat_map(|(name, unit)| ended(name, unit, ["mean", "rms"])));
     columns.extend(recorded_columns(record, model));
+    columns.extend(torus_columns(diagram, kept));
     columns.push(column("unstable", Style::Number));
     let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
@@ -99,6 +102,7 @@ pub fn points(
             (n..n + model.outputs.len()).chain(0..n).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]),
         );
         row.extend(recorded_cells(point, record, model));
+        row.extend(torus_cells(point, diagram, kept));
         row.push(if branch.family == Family::Arc { Cell::Empty } else { count(point.unstable) });
         let trust = point.trust;
         let sizes =
@@ -251,6 +255,29 @@ pub fn notes(notes: &[(String, String)], name: Option<&str>) -> Table {
 }
 
 /// Columns NAME_turns: number of turns over a cycle of each state that is an angle.
+/// Names of the columns that appear where branches of tori are shown: the rotation number, both angular frequencies, and
+/// the number of trajectories.
+const OF_TORI: [&str; 4] = ["rotation", "frequency_1", "frequency_2", "phases"];
+
+fn shows_tori(diagram: &Diagram, kept: &dyn Fn(&Branch) -> bool) -> bool {
+    diagram.branches.iter().any(|branch| branch.family == Family::Torus && kept(branch))
+}
+
+fn torus_columns(diagram: &Diagram, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
+    let names = OF_TORI.iter().filter(|_| shows_tori(diagram, kept));
+    names.map(|name| column(name, Style::Number)).collect()
+}
+
+fn torus_cells(point: &Point, diagram: &Diagram, kept: &dyn Fn(&Branch) -> bool) -> Vec<Cell> {
+    if !shows_tori(diagram, kept) {
+        return Vec::new();
+    }
+    let Solution::Torus(torus) = &point.solution else { return OF_TORI.map(|_| Cell::Empty).into() };
+    let [first, second] = torus.frequencies();
+    let phases = if point.solution.is_stored() { count(torus.phases()) } else { Cell::Empty };
+    vec![Cell::Number(torus.rotation), Cell::Number(first), Cell::Number(second), phases]
+}
+
 fn turn_columns(model: &Model) -> impl Iterator<Item = Column> {
     model.angles().map(|(k, _)| column(&format!("{}_turns", model.states[k].name), Style::Number))
 }

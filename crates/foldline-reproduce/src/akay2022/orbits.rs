@@ -17,6 +17,7 @@ pub fn cycle(point: &Point) -> Result<&Cycle, String> {
     match &point.solution {
         Solution::Cycle(cycle) => Ok(cycle),
         Solution::Equilibrium(_) => Err("an equilibrium has no orbit".into()),
+        Solution::Torus(_) => Err("a torus is no closed orbit".into()),
     }
 }
 

@@ -242,7 +242,7 @@ fn described(point: Point, constants: &Nondimensional, ratio: Ratio) -> Backbone
             let spectrum = Spectrum::of(cycle, speed);
             (cycle.period, spectrum.amplitude(0).re, spectrum.swirl())
         }
-        Solution::Equilibrium(_) => (f64::NAN, f64::NAN, f64::NAN),
+        Solution::Equilibrium(_) | Solution::Torus(_) => (f64::NAN, f64::NAN, f64::NAN),
     };
     let mean = (!symmetric).then_some(mean);
     BackbonePoint { speed, r_max, r_min, period, mean, swirl, mass: constants.mass, point }

@@ -229,6 +229,7 @@ impl ZeroProblem for BackboneProblem {
         let (x, period) = match &point.solution {
             Solution::Cycle(cycle) => (cycle.state(0.0), cycle.period),
             Solution::Equilibrium(x) => (x.clone(), f64::NAN),
+            Solution::Torus(torus) => (torus.state(0.0, 0.0), f64::NAN),
         };
         let half = 0.5 * period / self.radial_periods();
         vec![x[0], x[3], half, point.parameters.first().copied().unwrap_or(f64::NAN)]

@@ -42,6 +42,7 @@ pub(super) fn point_cells(point: &Point, model: &Model, cycles: bool) -> Vec<Cel
     let (state, degree, intervals) = match &point.solution {
         Solution::Equilibrium(state) => (&state[..], 0, 0),
         Solution::Cycle(cycle) => (&[][..], cycle.degree, cycle.intervals()),
+        Solution::Torus(torus) => (&[][..], torus.degree, torus.intervals()),
     };
     if !cycles {
         out.extend(padded(state, n));

@@ -287,6 +287,7 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
         "equilibrium" => Family::Equilibrium,
         "cycle" => Family::Cycle,
         "arc" => Family::Arc,
+        "torus" => Family::Torus,
         other => return Err(format!("unknown family \"{other}\"")),
     };
     let name: String = row.get("name").map_err(|e| e.to_string())?;

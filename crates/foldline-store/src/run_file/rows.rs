@@ -1,7 +1,7 @@
 //! Conversion between points and rows.
 
 use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
-use foldline::diagram::{Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Trust};
+use foldline::diagram::{Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Torus, Trust};
 use rusqlite::Row;
 use rusqlite::types::Value;
 
@@ -12,6 +12,8 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     let (degree, profile) = match &point.solution {
         Solution::Equilibrium(state) => (Value::Null, state),
         Solution::Cycle(cycle) => (count(cycle.degree), &cycle.profile),
+        // The sign tells tori from cycles; their rotation number takes the place of gains.
+        Solution::Torus(torus) => (Value::Integer(-(torus.degree as i64)), &torus.profile),
     };
     let trust = &point.trust;
     let shown = point.parameters.iter().chain(point.ranges.as_flattened());
@@ -27,7 +29,10 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         trust.spectrum,
     ];
     scalars.extend_from_slice(extra);
-    let gain = pack(point.solution.gain());
+    let gain = match &point.solution {
+        Solution::Torus(torus) => pack(&[torus.rotation]),
+        other => pack(other.gain()),
+    };
     let light = [
         pack(&point.parameters),
         pack_complex(&point.spectrum),
@@ -123,6 +128,7 @@ fn mesh_bytes(solution: &Solution) -> Vec<u8> {
     match solution {
         Solution::Equilibrium(_) => Vec::new(),
         Solution::Cycle(cycle) => pack(&cycle.mesh),
+        Solution::Torus(torus) => pack(&torus.mesh),
     }
 }
 
@@ -143,6 +149,26 @@ fn numbers_checksum(position: i64, [unstable, forcing_periods]: [usize; 2], ligh
     }
     light.iter().for_each(|part| sum.bytes(part));
     sum.value()
+}
+
+/// The torus in a row, from its degree as stored, the bytes of its rotation number, and its mesh and profile.
+fn torus_in(
+    period: f64,
+    degree: i64,
+    forcing_periods: usize,
+    rotation: &[u8],
+    (mesh, profile): (Vec<f64>, Vec<f64>),
+) -> Result<Torus, String> {
+    let rotation = unpack(rotation).and_then(|all| all.first().copied()).ok_or("gain_bytes holds no rotation number")?;
+    let degree = usize::try_from(-degree).map_err(|e| e.to_string())?;
+    let forcing_periods = u32::try_from(forcing_periods).map_err(|e| e.to_string())?;
+    let torus = Torus { period, rotation, forcing_periods, mesh: mesh.into(), degree, profile };
+    let nodes = torus.intervals() * (degree + 1) * torus.phases();
+    let removed = torus.mesh.is_empty() && torus.profile.is_empty();
+    if !removed && (nodes == 0 || !torus.profile.len().is_multiple_of(nodes)) {
+        return Err("solution_bytes and mesh_bytes do not belong together".to_string());
+    }
+    Ok(torus)
 }
 
 /// Returns the point in a row and the extra numbers stored with its scalars. If the solution was not queried, it and
@@ -201,6 +227,11 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let profile = if whole { numbers("solution_bytes")? } else { Vec::new() };
     let solution = match row.get::<_, Option<i64>>("degree").map_err(|e| e.to_string())? {
         None => Solution::Equilibrium(profile),
+        Some(degree) if degree < 0 => {
+            Solution::Torus(torus_in(*period, degree, later("forcing_periods")?, &newer_bytes("gain_bytes")?, {
+                if whole { (numbers("mesh_bytes")?, profile) } else { Default::default() }
+            })?)
+        }
         Some(_) => {
             let mesh = if whole { numbers("mesh_bytes")? } else { Vec::new() };
             let degree = count("degree")?;

@@ -117,6 +117,7 @@ impl<'a> Rolled<'a> {
                 cycle.profile = cycle.profile.chunks_exact(n).flat_map(|x| self.rolled(x)).collect();
                 cycle.gain.clear();
             }
+            Solution::Torus(_) => {}
         }
         point.ranges.splice(n..n, vec![[-1.0, 1.0]; self.angles.len()]);
         point
@@ -131,6 +132,7 @@ impl<'a> Rolled<'a> {
                 cycle.profile = self.line(&cycle.profile);
                 cycle.gain = self.gain(cycle);
             }
+            Solution::Torus(_) => {}
         }
         if point.ranges.len() >= n + self.angles.len() {
             point.ranges.drain(n..n + self.angles.len());

@@ -309,7 +309,7 @@ pub(super) fn survey(
                     Solution::Cycle(cycle) => {
                         ended.period == cycle.intervals() && cycle.profile.chunks_exact(n).any(near)
                     }
-                    Solution::Equilibrium(_) => false,
+                    Solution::Equilibrium(_) | Solution::Torus(_) => false,
                 })
             };
             let place = known(&census.attractors).or_else(|| {

@@ -67,10 +67,11 @@ impl Orbit {
     pub(super) fn new(point: Point, scales: &[f64], whirl: Option<[usize; 2]>) -> Orbit {
         let ratio = match &point.solution {
             Solution::Cycle(cycle) => whirl.and_then(|whirl| spectral_ratio(cycle, whirl)),
-            Solution::Equilibrium(_) => None,
+            Solution::Equilibrium(_) | Solution::Torus(_) => None,
         };
         let (states, scale) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), scales.to_vec()),
+            Solution::Torus(torus) => (torus.section(0.0), scales.to_vec()),
             Solution::Cycle(cycle) => {
                 let mut states = cycle.uniform(SAMPLES[0]);
                 let scale = half_ranges(&states, scales);

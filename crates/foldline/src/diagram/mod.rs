@@ -5,12 +5,14 @@ mod number;
 mod record;
 mod response;
 mod share;
+mod torus;
 
 pub use cycle::Cycle;
 pub use number::Shown;
 pub use record::{Misfit, Record};
 pub use response::{Motion, Response, Responses, Search};
 pub use share::Share;
+pub use torus::Torus;
 
 use num_complex::Complex64;
 use std::fmt;
@@ -26,6 +28,8 @@ pub enum Solution {
     Equilibrium(Vec<f64>),
     /// A periodic orbit.
     Cycle(Cycle),
+    /// A two-dimensional invariant torus.
+    Torus(Torus),
 }
 
 /// Scales and periods for the comparison of solutions.
@@ -42,6 +46,7 @@ impl Solution {
     pub fn is_stored(&self) -> bool {
         match self {
             Solution::Cycle(cycle) => !cycle.profile.is_empty(),
+            Solution::Torus(torus) => !torus.profile.is_empty(),
             Solution::Equilibrium(_) => true,
         }
     }
@@ -50,7 +55,7 @@ impl Solution {
     pub fn gain(&self) -> &[f64] {
         match self {
             Solution::Cycle(cycle) => &cycle.gain,
-            Solution::Equilibrium(_) => &[],
+            Solution::Equilibrium(_) | Solution::Torus(_) => &[],
         }
     }
 
@@ -69,11 +74,12 @@ impl Solution {
         })
     }
 
-    /// Period of a cycle.
+    /// Period of a cycle, or the first period of a torus.
     pub fn period(&self) -> Option<f64> {
         match self {
             Solution::Equilibrium(_) => None,
             Solution::Cycle(cycle) => Some(cycle.period),
+            Solution::Torus(torus) => Some(torus.period),
         }
     }
 
@@ -87,6 +93,7 @@ impl Solution {
         match self {
             Solution::Equilibrium(_) => Mesh::default(),
             Solution::Cycle(cycle) => cycle.mesh.clone(),
+            Solution::Torus(torus) => torus.mesh.clone(),
         }
     }
 
@@ -100,6 +107,7 @@ impl Solution {
         match self {
             Solution::Equilibrium(_) => 0,
             Solution::Cycle(cycle) => cycle.forcing_periods,
+            Solution::Torus(torus) => torus.forcing_periods,
         }
     }
 }
@@ -182,6 +190,8 @@ impl Point {
     pub fn free_spectrum(&self) -> &[Complex64] {
         match &self.solution {
             Solution::Cycle(cycle) if cycle.forcing_periods == 0 => self.spectrum.get(1..).unwrap_or(&[]),
+            // Perturbations along the torus.
+            Solution::Torus(torus) => self.spectrum.get(if torus.forcing_periods == 0 { 2 } else { 1 }..).unwrap_or(&[]),
             _ => &self.spectrum,
         }
     }
@@ -275,15 +285,18 @@ impl Point {
 
     /// Drops the profile and mesh of a cycle and the tangent, which make up nearly all of a point.
     pub fn lighten(&mut self) {
-        if let Solution::Cycle(cycle) = &mut self.solution {
-            (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new());
-            self.tangent = Vec::new();
-        }
+        let (mesh, profile) = match &mut self.solution {
+            Solution::Equilibrium(_) => return,
+            Solution::Cycle(cycle) => (&mut cycle.mesh, &mut cycle.profile),
+            Solution::Torus(torus) => (&mut torus.mesh, &mut torus.profile),
+        };
+        (*mesh, *profile) = (Vec::new().into(), Vec::new());
+        self.tangent = Vec::new();
     }
 
     /// True if profile and tangent were dropped.
     pub fn is_light(&self) -> bool {
-        matches!(&self.solution, Solution::Cycle(cycle) if cycle.profile.is_empty())
+        !self.solution.is_stored()
     }
 
     /// Component of the tangent along the continuation parameter, relative to the scale of the parameter.
@@ -630,6 +643,8 @@ pub enum Family {
     Cycle,
     /// Solutions of a boundary-value problem.
     Arc,
+    /// Tori.
+    Torus,
 }
 
 impl Family {
@@ -639,6 +654,7 @@ impl Family {
             Family::Equilibrium => "equilibrium",
             Family::Cycle => "cycle",
             Family::Arc => "arc",
+            Family::Torus => "torus",
         }
     }
 }

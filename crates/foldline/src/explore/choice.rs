@@ -27,7 +27,7 @@ impl<'c> Choice<'c> {
     pub(super) fn of(system: &System, tolerance: f64, census: &'c Census, key: &AttractorKey) -> Choice<'c> {
         let size = |a: &Attractor| match &a.point.solution {
             Solution::Equilibrium(x) => system.norm(x),
-            Solution::Cycle(_) => f64::INFINITY,
+            Solution::Cycle(_) | Solution::Torus(_) => f64::INFINITY,
         };
         let mut fitting: Vec<&Attractor> =
             census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio)).collect();
@@ -80,6 +80,7 @@ fn described(system: &System, attractor: &Attractor) -> String {
 fn kind(system: &System, attractor: &Attractor) -> String {
     match (&attractor.point.solution, attractor.ratio) {
         (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
+        (Solution::Torus(_), _) => "torus".to_string(),
         (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
         (Solution::Cycle(cycle), None) => {
             let sense = system.whirl.filter(|_| system.field.forced()).and_then(|whirl| whirl_sense(cycle, whirl));

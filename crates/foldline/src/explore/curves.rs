@@ -8,7 +8,7 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use crate::continuation::{Settings, UNCROSSED};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Ending, Kind, Origin, Point, Shown, SpecialPoint};
+use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::unfolded::{Unfolded, sizes};
 
@@ -20,6 +20,9 @@ const SHARPER: f64 = 0.2;
 /// # Errors
 /// A sentence that lists the special points of the branch, if none fits.
 pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoint, String> {
+    if branch.family == Family::Torus {
+        return Err(format!("bifurcations of tori cannot be continued in two parameters ({} is a branch of tori)", branch.name));
+    }
     let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
     let fitting = branch.special.iter().filter(|special| special.kind == plan.hold);
     let found = match plan.near {

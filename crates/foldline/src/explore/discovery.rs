@@ -90,6 +90,7 @@ impl Discovery<'_, '_> {
         }
         let kind = match (&point.solution, system.whirl) {
             (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
+            (Solution::Torus(_), _) => "torus".to_string(),
             (Solution::Cycle(cycle), Some(whirl)) => {
                 spectral_ratio(cycle, whirl).map_or("cycle".to_string(), |(p, q)| format!("{p}:{q}"))
             }

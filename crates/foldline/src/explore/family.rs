@@ -7,7 +7,7 @@ use super::seeds::Seeds;
 use super::{System, arrival, connections, crossings, curves, discovery, holds, homotopy, known, near, switch};
 use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, SpecialPoint};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use std::ops::Range;
 
 /// A root: something that starts at a seed, or finds its own starts.
@@ -221,6 +221,10 @@ impl Work<'_> {
     /// Follows a homotopy, and everything that starts at its goal.
     fn brought(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
         let homotopy = &self.plan.homotopies[index];
+        let start = start.and_then(|point| match point.solution {
+            Solution::Torus(_) => Err("tori cannot be carried by a homotopy; follow a branch with `until`".into()),
+            _ => Ok(point),
+        });
         let route = homotopy::find(self.system, self.plan, homotopy, origin, start, self.earlier, self.observer);
         self.branches.extend(route.legs);
         route.going && self.after(Start::EndOfHomotopy(index), &homotopy.name, route.arrived)
@@ -287,6 +291,9 @@ impl Work<'_> {
         };
         let mut branch = Branch::new(&plan.name, family, plan.free, origin);
         let begun = start.and_then(|point| {
+            if matches!(point.solution, Solution::Torus(_)) {
+                return Err("quantities cannot be held along tori".into());
+            }
             let moving: Vec<(usize, [f64; 2])> =
                 plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
             self.system.repeats(&point.parameters, &[&moving[..], &[(plan.free, plan.range)]].concat())?;
@@ -411,7 +418,8 @@ impl Work<'_> {
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
             let below = pending.switching.below(special.kind, counts[slot]);
             let leaving = Leaving { plan, settings: &settings, parent: &parent, special, label, below };
-            let kernel = if special.kind == Kind::BranchPoint { special.kernel() } else { 1 };
+            let of_torus = matches!(special.point.solution, Solution::Torus(_));
+            let kernel = if special.kind == Kind::BranchPoint && !of_torus { special.kernel() } else { 1 };
             let going = match kernel {
                 1 => self.left(&leaving, name, &mut more),
                 _ => self.left_in_all_directions(&leaving, &name, kernel, &mut more),

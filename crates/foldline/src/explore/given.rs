@@ -25,6 +25,7 @@ pub fn mismatch(field: &dyn VectorField, parameters: &[f64], solution: &Solution
     let sizes = match solution {
         Solution::Equilibrium(state) => at_rest(field, parameters, state),
         Solution::Cycle(cycle) => along(field, parameters, cycle),
+        Solution::Torus(_) => return None,
     };
     let share = |[off, size]: [f64; 2]| if off == 0.0 { 0.0 } else { off / size.max(f64::MIN_POSITIVE) };
     let shares = sizes.into_iter().map(share).enumerate();

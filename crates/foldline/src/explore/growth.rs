@@ -9,6 +9,7 @@ use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, 
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
 use crate::problem::map::MapProblem;
+use crate::problem::torus::TorusProblem;
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
@@ -80,6 +81,9 @@ impl Line {
                 let problem = Box::new(CycleProblem::like(setting.clone(), &cycle));
                 (Solution::Cycle(cycle), problem)
             }
+            Solution::Torus(torus) => {
+                (point.solution.clone(), Box::new(TorusProblem::like(setting.clone(), torus, None)))
+            }
         };
         let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
         let free = setting.freedom();
@@ -144,6 +148,7 @@ pub fn surface<'a>(
             Box::new(CycleProblem::like(setting, cycle).with_equal_halves())
         }
         Solution::Cycle(cycle) => Box::new(CycleProblem::like(setting, &mesh::at_least_some(cycle, degree))),
+        Solution::Torus(torus) => Box::new(TorusProblem::like(setting, torus, None)),
     }
 }
 
@@ -798,6 +803,7 @@ impl Growth<'_> {
                 }
                 special::map_form::coefficients(special.kind, &own, &at, special.error)
             }
+            Solution::Torus(_) => Coefficients { remark: on_torus(special.kind).into(), ..Coefficients::default() },
             // Normal forms of boundary-value problems are not computed.
             Solution::Cycle(_) if system.is_open() => {
                 Coefficients { remark: special.remark.clone(), ..Coefficients::default() }
@@ -882,6 +888,16 @@ fn starts_inside(branch: &Branch) -> bool {
     branch.held.is_some() || inside
 }
 
+/// What a bifurcation of a torus is called, for kinds that are named after those of cycles.
+fn on_torus(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Torus => "quasi-periodic Hopf: a third frequency appears, and the tori with it are not followed",
+        Kind::PeriodDoubling => "the torus doubles; the doubled torus is not followed",
+        Kind::BranchPoint => "another branch of tori crosses, which is not followed",
+        _ => "",
+    }
+}
+
 /// True if a branch was born by period doubling.
 pub fn is_doubled(branch: &Branch) -> bool {
     branch.held.is_none() && matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
@@ -914,6 +930,9 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
             scales: &system.scales,
             born: is_doubled(branch) || lasts_even_periods(branch),
         }));
+    }
+    if branch.family == Family::Torus {
+        all.push(Box::new(collapse::Narrows { scales: &system.scales }));
     }
     if branch.family == Family::Cycle && !system.field.forced() {
         all.push(shrinks(system, branch.free, Kind::Hopf));

@@ -80,7 +80,7 @@ impl<'l> Lookout<'l> {
         }
         let size = |point: &Point| match &point.solution {
             Solution::Equilibrium(x) => system.norm(x),
-            Solution::Cycle(_) => f64::INFINITY,
+            Solution::Cycle(_) | Solution::Torus(_) => f64::INFINITY,
         };
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();

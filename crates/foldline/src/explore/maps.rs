@@ -169,7 +169,7 @@ pub(super) fn from_state(
                 .zip(&system.scales)
                 .map(|((a, b), s)| (a - b).abs() / (s + b.abs()))
                 .fold(0.0, f64::max),
-            Solution::Equilibrium(_) => f64::INFINITY,
+            Solution::Equilibrium(_) | Solution::Torus(_) => f64::INFINITY,
         };
         (off, point)
     });

@@ -141,7 +141,7 @@ fn on_equal_turns(system: &System, settings: &Settings, point: &Point, cycle: &C
     correct(&mut *problem, settings, &plane, &mut u, &mut Cost::default()).ok()?;
     match problem.point(&u, &[], Examination::default()).solution {
         Solution::Cycle(equal) => Some(equal),
-        Solution::Equilibrium(_) => None,
+        Solution::Equilibrium(_) | Solution::Torus(_) => None,
     }
 }
 

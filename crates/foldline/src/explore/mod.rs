@@ -69,6 +69,8 @@ mod tests;
 #[cfg(test)]
 mod tests_identity;
 pub mod together;
+pub mod tori;
+mod unforced;
 
 pub use axis::axis_of;
 pub(crate) use corner::SLIDING;

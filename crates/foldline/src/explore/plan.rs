@@ -29,6 +29,8 @@ pub enum SeedSource {
     State(Vec<f64>),
     /// Limit of Newton's method from this cycle.
     Cycle(Cycle),
+    /// The torus that the cycle from this source is, where the forcing does not act yet.
+    Torus(Box<SeedSource>),
 }
 
 /// A first solution.

@@ -250,6 +250,7 @@ fn state(solution: &Solution, time: f64) -> Vec<f64> {
     match solution {
         Solution::Equilibrium(x) => x.clone(),
         Solution::Cycle(cycle) => cycle.state(time.rem_euclid(1.0)),
+        Solution::Torus(torus) => torus.state(0.0, time.rem_euclid(1.0)),
     }
 }
 

@@ -154,6 +154,7 @@ fn one_sweep(
     let state = match &point.solution {
         Solution::Equilibrium(x) => x.clone(),
         Solution::Cycle(cycle) => cycle.state(0.0),
+        Solution::Torus(torus) => torus.state(0.0, 0.0),
     };
     let parameters = match start {
         Start::Seed(seed) => plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters),

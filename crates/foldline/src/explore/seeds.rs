@@ -15,6 +15,7 @@ use super::maps;
 use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use super::profile::{Spread, first_profile, with_degree};
+use super::tori;
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
@@ -156,6 +157,7 @@ impl<'p> Seeds<'p> {
                 let tell = |note: &str| _ = self.observer.observe(Event::Note(&seed.name, note));
                 from_state(system, seed, plan, state, self.jobs, &tell)?
             }
+            SeedSource::Torus(source) => return tori::lifted(system, plan, seed, source, self.jobs),
             SeedSource::Attractor(key) => {
                 if let Some(why) = in_families(system, seed) {
                     return Err(format!("no equilibrium is isolated{why}"));
@@ -179,7 +181,15 @@ impl<'p> Seeds<'p> {
 /// A sentence that says why there is none.
 pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: usize) -> Result<Point, String> {
     const DEGREE: usize = 4;
-    let (seeds, free, range) = (vec![seed.clone()], 0, [f64::NEG_INFINITY, f64::INFINITY]);
+    first_of(system, seed.clone(), &Plan::empty(tolerance, DEGREE), jobs)
+}
+
+/// Finds the first solution for a single seed, with the tolerance, degree and limits of a plan.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub(super) fn first_of(system: &System, seed: SeedPlan, like: &Plan, jobs: usize) -> Result<Point, String> {
+    let (seeds, free, range) = (vec![seed], 0, [f64::NEG_INFINITY, f64::INFINITY]);
     let (switching, marks) = Default::default();
     let start = Start::Seed(0);
     let branch = BranchPlan {
@@ -193,7 +203,7 @@ pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: us
         marks,
         max_points: 0,
     };
-    let plan = Plan { seeds, branches: vec![branch], ..Plan::empty(tolerance, DEGREE) };
+    let plan = Plan { seeds, branches: vec![branch], limits: like.limits, ..Plan::empty(like.tolerance, like.degree) };
     Seeds::new(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
 }
 
@@ -231,7 +241,7 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
     let seed = &plan.seeds[index];
     let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
         SeedSource::Attractor(key) => Some(key),
-        SeedSource::State(_) | SeedSource::Cycle(_) => None,
+        SeedSource::Torus(_) | SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
     let newton = if system.field.iterated() { None } else { newton_from_rest(system, plan, seed) };

@@ -4,7 +4,7 @@
 //! vector orthogonal to the tangent, the Hopf eigenvector. A first point is found by Newton's method in the hyperplane
 //! a small step along that direction, which the original branch does not reach to first order.
 
-use super::System;
+use super::{System, tori};
 use super::growth::{Beginning, problem_of, setting};
 use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, station};
 use crate::continuation::{Failure, Settings};
@@ -39,6 +39,10 @@ pub fn beginning(
         (Kind::Hopf, Solution::Equilibrium(_)) => {
             born(system, settings, free, degree, at, pair).map(|b| (Family::Cycle, b))
         }
+        (Kind::Torus, Solution::Cycle(cycle)) if !system.field.iterated() => {
+            tori::born(system, settings, free, at, cycle).map(|b| (Family::Torus, b))
+        }
+        (Kind::BranchPoint, Solution::Torus(_)) => return None,
         (Kind::BranchPoint, solution) => {
             let family = system.family_of(solution);
             crossing(system, settings, free, degree, at).map(|b| (family, b))
@@ -48,12 +52,12 @@ pub fn beginning(
     Some(found)
 }
 
-fn joined(at: &SpecialPoint, free: usize) -> Ending {
+pub(super) fn joined(at: &SpecialPoint, free: usize) -> Ending {
     Ending::Joined { at: at.kind, parameter: at.point.parameters[free] }
 }
 
 /// Returns the first point at one of the `distances` along `direction` (not normalised) from `base`.
-fn step_off(
+pub(super) fn step_off(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     base: &[f64],

@@ -133,6 +133,7 @@ impl<'a> System<'a> {
             Solution::Equilibrium(_) => Family::Equilibrium,
             Solution::Cycle(_) if self.is_open() => Family::Arc,
             Solution::Cycle(_) => Family::Cycle,
+            Solution::Torus(_) => Family::Torus,
         }
     }
 

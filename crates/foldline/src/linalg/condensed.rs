@@ -27,6 +27,7 @@
 //!
 //! **Fails when** an interior block or the final matrix is singular to working precision.
 
+use super::apart::Remainder;
 use super::chain::{Chain, Links};
 use super::compound::Compound;
 use super::dense::MANY;
@@ -80,6 +81,8 @@ pub struct Condensed<T> {
     whole: Chain<f64>,
     /// Conditions that replace (3), if any.
     open: Option<Ends>,
+    /// Without (3): what the elimination leaves of the ends.
+    apart: Option<Remainder>,
     last: Vec<f64>,
     last_pivots: Vec<usize>,
 }
@@ -292,6 +295,28 @@ impl<T: Lane> Condensed<T> {
         self.open = ends;
     }
 
+    /// Leaves the ends free: elimination stops at the relation between them, which [`Condensed::remainder`] returns.
+    pub fn leave_apart(&mut self) {
+        self.apart = Some(Remainder::default());
+    }
+
+    /// What the last elimination left of free ends.
+    pub fn remainder(&self) -> Option<&Remainder> {
+        self.apart.as_ref()
+    }
+
+    /// Carries right-hand sides, as for [`Condensed::solve`], to the free ends: `to` receives h (n) of the remaining
+    /// relation and s (q) of the border.
+    pub fn forward(&self, rhs: &[f64], to: &mut [f64]) {
+        T::dispatch(Solve { system: self, rhs, x: to, stage: Stage::Forward });
+    }
+
+    /// The solution for right-hand sides `rhs` where the free ends and the scalars are `known`, x_0, x_N (n each) and
+    /// σ (q).
+    pub fn backward(&self, rhs: &[f64], known: &[f64], x: &mut [f64]) {
+        T::dispatch(Solve { system: self, rhs, x, stage: Stage::Backward(known) });
+    }
+
     /// The conditions on both ends that replace (3), if any.
     pub fn ends(&self) -> Option<&Ends> {
         self.open.as_ref()
@@ -300,7 +325,7 @@ impl<T: Lane> Condensed<T> {
     /// Solves (1)–(4). `rhs` contains c_j (n) and r_j (m·n) for each interval, then s (q); the solution contains x_j
     /// and X_j for each interval, then σ.
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
-        T::dispatch(Solve { system: self, rhs, x });
+        T::dispatch(Solve { system: self, rhs, x, stage: Stage::Whole });
     }
 
     /// Solves the transposed system. `z` has the layout of the unknowns (x_j, X_j per interval, then σ), `y` that of
@@ -611,7 +636,7 @@ impl<T: Lane> Condensed<T> {
     fn reduced(&mut self, corner: &[f64], together: bool) -> Result<(), Singular> {
         let Condensed { n, q, closure, length, .. } = *self;
         let (width, full) = (n + q, 3 * n + q);
-        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, open, own_units, .. } = self;
+        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, open, apart, own_units, .. } = self;
         let (step, condensed_border) = (&step[..length * n * width], &condensed_border[..length * q * n]);
         *gentle = together;
         if together {
@@ -631,6 +656,12 @@ impl<T: Lane> Condensed<T> {
         add(1.0, &beyond[..(T::COUNT - 1) * q * n], &mut border[q * n..]);
         whole.eliminate(Pieces { relation: &pieces.relation, n, q }, &border)?;
         add(1.0, &beyond[(T::COUNT - 1) * q * n..], &mut whole.last);
+        if let Some(apart) = apart {
+            let sum = |k: usize| corner[k] + total(pieces.corner[k]) + whole.corner[k];
+            let corner: Vec<f64> = (0..q * q).map(sum).collect();
+            apart.take(whole, corner, own_units, [n, q]);
+            return Ok(());
+        }
         if let Some(ends) = open {
             let sum = |k: usize| corner[k] + total(pieces.corner[k]) + whole.corner[k];
             let corner: Vec<f64> = (0..q * q).map(sum).collect();
@@ -659,7 +690,7 @@ impl<T: Lane> Condensed<T> {
     /// True if the last matrix is far from singular.
     fn is_settled(&self) -> bool {
         // Conditions on the ends have units of their own, which pivots would have to be compared in.
-        if self.open.is_some() {
+        if self.open.is_some() || self.apart.is_some() {
             return true;
         }
         let width = self.n + self.q;
@@ -727,10 +758,20 @@ impl<T: Lane> Condensed<T> {
     }
 }
 
+/// How far to solve.
+enum Stage<'a> {
+    Whole,
+    /// To the relation between the ends and the border.
+    Forward,
+    /// From x_0, x_N and σ.
+    Backward(&'a [f64]),
+}
+
 struct Solve<'a, T> {
     system: &'a Condensed<T>,
     rhs: &'a [f64],
     x: &'a mut [f64],
+    stage: Stage<'a>,
 }
 
 impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
@@ -751,7 +792,7 @@ impl<T: Lane> Solve<'_, T> {
     /// Solves; the dimensions are passed again, so that they can be constants.
     #[inline(always)]
     fn solved(self, [n, m, q]: [usize; 3]) {
-        let Solve { system, rhs, x } = self;
+        let Solve { system, rhs, x, stage } = self;
         let Condensed { intervals, length, closure, .. } = *system;
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
@@ -797,13 +838,23 @@ impl<T: Lane> Solve<'_, T> {
             tail[n + c] += rhs[size + c] + total(taken[c]);
         }
         let (beginning, closing) = nodes.split_at_mut(T::COUNT * n);
-        match &system.open {
-            None => {
+        match (stage, &system.open) {
+            (Stage::Forward, _) => {
+                x[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
+                x[n..n + q].copy_from_slice(&tail[n..]);
+                return;
+            }
+            (Stage::Backward(known), _) => {
+                let in_units = |k: usize| known[k] / system.own_units[k % n];
+                (0..n).for_each(|k| (tail[k], closing[k]) = (in_units(k), in_units(n + k)));
+                tail[n..].copy_from_slice(&known[2 * n..]);
+            }
+            (Stage::Whole, None) => {
                 tail[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
                 lu::solve(&system.last, width, &system.last_pivots, tail, 1);
                 closing.iter_mut().zip(&tail[..n]).for_each(|(to, v)| *to = closure * v);
             }
-            Some(open) => {
+            (Stage::Whole, Some(open)) => {
                 let found = open.solve(&ends[(T::COUNT - 1) * n..], &tail[n..], &rhs[size + q..]);
                 tail[..n].copy_from_slice(&found[..n]);
                 tail[n..].copy_from_slice(&found[2 * n..]);

@@ -3,6 +3,7 @@
 //! Matrices are row-major slices. The kernels serve blocks of up to about forty rows, for which calling a general
 //! library costs more than the arithmetic.
 
+pub mod apart;
 pub mod block;
 pub mod chain;
 pub mod compound;

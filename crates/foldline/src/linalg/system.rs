@@ -1,5 +1,6 @@
 //! The block system with the number of lanes that suits its size.
 
+use super::apart::Remainder;
 use super::condensed::Condensed;
 use super::ends::Ends;
 use super::lane::Eight;
@@ -94,6 +95,26 @@ impl System {
     /// See [`Condensed::open`].
     pub fn open(&mut self, ends: Option<Ends>) {
         either!(self, s => s.open(ends));
+    }
+
+    /// See [`Condensed::leave_apart`].
+    pub fn leave_apart(&mut self) {
+        either!(self, s => s.leave_apart());
+    }
+
+    /// See [`Condensed::remainder`].
+    pub fn remainder(&self) -> Option<&Remainder> {
+        either!(self, s => s.remainder())
+    }
+
+    /// See [`Condensed::forward`].
+    pub fn forward(&self, rhs: &[f64], to: &mut [f64]) {
+        either!(self, s => s.forward(rhs, to));
+    }
+
+    /// See [`Condensed::backward`].
+    pub fn backward(&self, rhs: &[f64], known: &[f64], x: &mut [f64]) {
+        either!(self, s => s.backward(rhs, known, x));
     }
 
     /// See [`Condensed::ends`].

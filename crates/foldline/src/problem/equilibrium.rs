@@ -235,6 +235,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let mut u = match &point.solution {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
+            Solution::Torus(torus) => torus.state(0.0, 0.0),
         };
         u.resize(self.first(), 0.0);
         u.extend(self.setting.unknowns_of(point));

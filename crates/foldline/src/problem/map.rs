@@ -96,7 +96,7 @@ impl<'a> MapProblem<'a> {
     pub fn like(setting: Setting<'a>, solution: &Solution) -> MapProblem<'a> {
         let (count, gain) = match solution {
             Solution::Cycle(cycle) => (cycle.forcing_periods.max(1) as usize, cycle.gain.clone()),
-            Solution::Equilibrium(_) => (1, Vec::new()),
+            Solution::Equilibrium(_) | Solution::Torus(_) => (1, Vec::new()),
         };
         let (scale, last, system) = (setting.scales.to_vec(), Along::default(), Cyclic::default());
         MapProblem { setting, count, gain, scale, last, system }
@@ -331,6 +331,7 @@ impl ZeroProblem for MapProblem<'_> {
         let mut u = match &point.solution {
             Solution::Cycle(cycle) => cycle.profile.clone(),
             Solution::Equilibrium(x) => x.iter().copied().cycle().take(self.size()).collect(),
+            Solution::Torus(_) => vec![f64::NAN; self.size()],
         };
         u.extend(self.setting.unknowns_of(point));
         u

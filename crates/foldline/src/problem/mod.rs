@@ -6,6 +6,7 @@
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
 //! | orbits that connect equilibria | profile, T, the equilibria, two parameters | [`connecting`] |
 //! | cycles of maps | all iterates, λ | [`map`] |
+//! | tori | profiles from equally spaced phases, T, ρ, λ | [`torus`] |
 //! | bifurcation points | those of either problem with two parameters, and extra ones of the condition | [`held`] |
 
 pub mod averages;
@@ -20,6 +21,7 @@ pub mod map;
 pub mod mesh;
 pub(crate) mod piecewise;
 pub mod setting;
+pub mod torus;
 mod unfolding;
 
 pub use setting::{Axis, Setting, Tie};

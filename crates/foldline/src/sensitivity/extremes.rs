@@ -70,6 +70,7 @@ pub fn extremes(field: &dyn VectorField, point: &Point) -> Vec<Extreme> {
         }
         Solution::Cycle(cycle) if cycle.degree == 0 => of_iterates(field, &point.parameters, cycle),
         Solution::Cycle(cycle) => of_cycle(field, &point.parameters, cycle),
+        Solution::Torus(_) => Vec::new(),
     }
 }
 
@@ -105,6 +106,7 @@ pub fn slope(
     let found = match (&extreme.place, &point.solution) {
         (Place::Nowhere(reason), _) => return Err(reason),
         (_, Solution::Equilibrium(x)) => at(x, along, None),
+        (_, Solution::Torus(_)) => return Err("sensitivities of tori are not supported"),
         (Place::Iterate(k), Solution::Cycle(cycle)) => {
             at(&cycle.profile[k * n..(k + 1) * n], &along[k * n..(k + 1) * n], None)
         }

@@ -42,7 +42,7 @@ pub use crate::model::Spread;
 pub use extremes::Extreme;
 pub use uncertainty::{Band, Uncertainty, uncertainty};
 
-use crate::diagram::{Branch, Kind, Point, SpecialPoint};
+use crate::diagram::{Branch, Family, Kind, Point, SpecialPoint};
 use crate::explore::plan::Plan;
 use crate::explore::{SLIDING, System, axis_of};
 use crate::special::unfolded::{Unfolded, sizes};
@@ -152,6 +152,7 @@ pub fn of_point(system: &System, branch: &Branch, point: &Point, plan: &Plan) ->
 fn not_posed(system: &System, branch: &Branch) -> Option<&'static str> {
     match branch {
         _ if system.is_open() => Some("sensitivities of boundary-value problems are not computed"),
+        branch if branch.family == Family::Torus => Some("sensitivities of tori are not computed"),
         branch if !branch.also.is_empty() => Some("sensitivities along a branch with held quantities are not computed"),
         _ => None,
     }

@@ -360,6 +360,7 @@ fn size_of(at: &Point) -> usize {
     match &at.solution {
         Solution::Equilibrium(x) => x.len(),
         Solution::Cycle(cycle) => cycle.profile.len(),
+        Solution::Torus(torus) => torus.profile.len(),
     }
 }
 

@@ -9,7 +9,7 @@
 //!   (3)  F_u φ = 0, φ ⊥ tangent:  direction in the plane spanned by the tangents of both branches
 
 use crate::contract::{Monitor, ZeroProblem};
-use crate::diagram::{FLAT, Kind, Point, Solution};
+use crate::diagram::{FLAT, Kind, Point};
 use num_complex::Complex64;
 
 /// Zero eigenvalue (multiplier 1) without a fold.
@@ -36,7 +36,7 @@ impl Monitor for BranchPoint {
     }
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
         // At a fold both factors vanish, at slightly different points numerically, and their product would change sign
         // twice.
         let slope = at.parameter_slope();
@@ -46,7 +46,7 @@ impl Monitor for BranchPoint {
 
     fn confirms(&self, at: &Point) -> bool {
         // The product also vanishes at a fold; there the tangent has no parameter component.
-        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
         let closest =
             self.spectrum_without_symmetry(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
@@ -55,7 +55,7 @@ impl Monitor for BranchPoint {
     }
 
     fn smooth(&self, at: &Point) -> Option<f64> {
-        if !matches!(at.solution, Solution::Cycle(_)) {
+        if at.solution.period().is_none() {
             return None;
         }
         // Coefficients of the characteristic polynomial, the highest power first.
@@ -78,7 +78,7 @@ impl Monitor for BranchPoint {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
         Some(self.spectrum_without_symmetry(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
     }
 
@@ -87,7 +87,7 @@ impl Monitor for BranchPoint {
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {
-        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
         super::others_unstable(at, 1, |z| (z - centre).norm())
     }
 }

@@ -9,6 +9,7 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
 use crate::problem::gauss::Scheme;
 use crate::problem::mesh;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 128;
@@ -109,6 +110,46 @@ impl Monitor for Shrinks<'_> {
     }
 }
 
+/// First harmonic in the phase of a torus: vanishes where the torus becomes a cycle.
+pub struct Narrows<'a> {
+    /// `[n]` characteristic sizes of the states.
+    pub scales: &'a [f64],
+}
+
+impl Narrows<'_> {
+    /// The first harmonic of every state at t = 0.
+    fn harmonic(point: &Point) -> Option<Vec<Complex64>> {
+        let Solution::Torus(torus) = &point.solution else { return None };
+        let (n, count) = (torus.dim(), torus.phases());
+        let first = torus.profile.get(..count * n)?;
+        let turn = |k: usize| Complex64::cis(-TAU * k as f64 / count as f64) * (2.0 / count as f64);
+        let of = |c: usize| first[c..].iter().step_by(n).enumerate().map(|(k, x)| turn(k) * x).sum();
+        Some((0..n).map(of).collect())
+    }
+}
+
+impl Monitor for Narrows<'_> {
+    fn kind(&self) -> Kind {
+        Kind::Torus
+    }
+
+    fn value(&self, reference: &Point, at: &Point) -> f64 {
+        let (Some(a), Some(b)) = (Narrows::harmonic(reference), Narrows::harmonic(at)) else { return f64::NAN };
+        a.iter().zip(&b).zip(self.scales).map(|((a, b), s)| (a.conj() * b).re / (s * s)).sum()
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        /// First harmonic, relative to the scales, below which the torus is a cycle: a zero is located far more closely.
+        const NOTHING: f64 = 1e-2;
+        let Some(own) = Narrows::harmonic(at) else { return false };
+        own.iter().zip(self.scales).all(|(z, s)| z.norm() < NOTHING * s)
+    }
+
+    fn jump(&self) -> usize {
+        0
+    }
+}
+
 /// Difference between a solution and its mirror image, for a cycle shifted by half a period if `half` is set: vanishes
 /// where the solution becomes symmetric.
 pub struct Mirrors {
@@ -131,6 +172,7 @@ impl Mirrors {
         let (x, n) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), x.len()),
             Solution::Cycle(cycle) => (cycle.level(SAMPLES), cycle.dim()),
+            Solution::Torus(torus) => (torus.section(0.0), torus.dim()),
         };
         let shift = if self.half && x.len() > n { x.len() / 2 } else { 0 };
         let mean = |c: usize| x.iter().skip(c).step_by(n).sum::<f64>() * n as f64 / x.len() as f64;

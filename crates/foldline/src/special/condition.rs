@@ -24,12 +24,13 @@ pub fn condition<'a>(
         _ if matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium) => {
             let whole = match at {
                 Solution::Cycle(cycle) => Solution::Cycle(mesh::at_least_some(cycle, degree)),
-                Solution::Equilibrium(_) => at.clone(),
+                Solution::Equilibrium(_) | Solution::Torus(_) => at.clone(),
             };
             Some(Box::new(OnSurfaces::new(kind, setting, &whole)?))
         }
         Solution::Equilibrium(_) if kind == Kind::BranchPoint => Some(Box::new(OnBranchPoints::new(setting))),
         Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
+        Solution::Torus(_) => None,
         Solution::Cycle(cycle) => Some(Box::new(OnCycles::new(kind, setting, &mesh::at_least_some(cycle, degree))?)),
     }
 }

@@ -2,7 +2,7 @@
 //! one of them, or in both at a cusp.
 
 use crate::contract::{Monitor, Sight};
-use crate::diagram::{Kind, Point, Solution};
+use crate::diagram::{Kind, Point};
 use num_complex::Complex64;
 
 /// Parameter component of the tangent.
@@ -82,7 +82,7 @@ impl Monitor for Passage {
 
 /// Critical value at a fold: eigenvalue 0, multiplier 1.
 fn critical(at: &Point) -> f64 {
-    if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 }
+    if at.solution.period().is_some() { 1.0 } else { 0.0 }
 }
 
 /// Turning point of a bifurcation curve in two parameters with respect to one of them only.

@@ -111,6 +111,7 @@ impl<'a> Along<'a> {
         match self.solution {
             Solution::Equilibrium(x) => x,
             Solution::Cycle(cycle) => &cycle.profile,
+            Solution::Torus(torus) => &torus.profile,
         }
     }
 
@@ -118,7 +119,8 @@ impl<'a> Along<'a> {
     fn gauss(&self, k: f64) -> Samples {
         let mut samples = Samples { times: vec![], starts: vec![], basis: vec![], nodes: 1, weights: vec![] };
         let cycle = match self.solution {
-            Solution::Equilibrium(_) => {
+            // Quantities of tori are read from their ranges and averages, and not held.
+            Solution::Equilibrium(_) | Solution::Torus(_) => {
                 samples.push(0.0, 0, &[1.0], 1.0);
                 return samples;
             }

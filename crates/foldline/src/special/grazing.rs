@@ -90,6 +90,7 @@ impl Monitor for Grazing<'_> {
         let cycle = match &at.solution {
             Solution::Equilibrium(x) => return value(self.field, &at.parameters, x, &[], self.switch)[0],
             Solution::Cycle(cycle) => cycle,
+            Solution::Torus(_) => return f64::NAN,
         };
         let (extrema, size) = extrema(self.field, &at.parameters, cycle, self.switch);
         let least = extrema.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
@@ -152,7 +153,7 @@ impl Grazing<'_> {
     fn matched(&self, left: &Point, right: &Point) -> Option<Matched> {
         let of = |at: &Point| match &at.solution {
             Solution::Cycle(cycle) => Some(extrema(self.field, &at.parameters, cycle, self.switch)),
-            Solution::Equilibrium(_) => None,
+            Solution::Equilibrium(_) | Solution::Torus(_) => None,
         };
         let [(a, size), (b, other)] = [of(left)?, of(right)?];
         let flat = |all: &[Extremum], size: f64| all.iter().filter(|e| e.value.abs() < ZERO * size).count() > 2;

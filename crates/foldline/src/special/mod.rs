@@ -49,7 +49,7 @@ pub mod torus;
 pub mod unfolded;
 
 use crate::contract::{Monitor, VectorField};
-use crate::diagram::{Family, Kind, Point, Solution};
+use crate::diagram::{Family, Kind, Point};
 use num_complex::Complex64;
 
 /// Monitors for branches of a solution family. `symmetric` is true if the model has a continuous symmetry.
@@ -57,7 +57,7 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     let both: [Box<dyn Monitor>; 2] = [Box::new(fold::Fold), Box::new(branch_point::BranchPoint { symmetric })];
     match family {
         Family::Equilibrium => both.into_iter().chain([Box::new(hopf::Hopf) as Box<dyn Monitor>]).collect(),
-        Family::Cycle => both
+        Family::Cycle | Family::Torus => both
             .into_iter()
             .chain([Box::new(period_doubling::PeriodDoubling) as Box<dyn Monitor>, Box::new(torus::Torus)])
             .collect(),
@@ -111,7 +111,7 @@ fn product<I: Iterator<Item = Complex64>>(factors: impl Fn() -> I) -> f64 {
 /// critical values; `None` if another one is neutral within its error and a small margin.
 fn others_unstable(at: &Point, passing: usize, distance: impl Fn(Complex64) -> f64) -> Option<usize> {
     const CLEAR: f64 = 1e-3;
-    let is_cycle = matches!(at.solution, Solution::Cycle(_));
+    let is_cycle = at.solution.period().is_some();
     let growth = |z: Complex64| if is_cycle { z.norm().ln() } else { z.re };
     let mut others: Vec<Complex64> = at.free_spectrum().to_vec();
     others.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));

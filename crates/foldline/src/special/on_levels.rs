@@ -85,6 +85,7 @@ impl<'a> OnLevels<'a> {
     fn solution(&mut self, own: &[f64], parameters: &[f64]) -> Option<Solution> {
         let (degree, mesh, forcing_periods, gain) = match &self.like {
             Solution::Equilibrium(_) => return Some(Solution::Equilibrium(own.to_vec())),
+            Solution::Torus(_) => return None,
             Solution::Cycle(cycle) => (cycle.degree, cycle.mesh.clone(), cycle.forcing_periods, cycle.gain.clone()),
         };
         if degree == 0 {

@@ -61,18 +61,20 @@ impl<'a> OnSurfaces<'a> {
                     let nearest = all.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
                     (size > 0.0).then_some(nearest / size)
                 }
+                Solution::Torus(_) => None,
             }
         };
         let fits = match at {
             Solution::Equilibrium(_) => kind == Kind::BoundaryEquilibrium,
             Solution::Cycle(_) => kind == Kind::Grazing,
+            Solution::Torus(_) => false,
         };
         let switch = (0..count).filter(|_| fits).min_by(|a, b| {
             let value = |switch: &usize| least(*switch).unwrap_or(f64::INFINITY);
             value(a).total_cmp(&value(b))
         })?;
         let (degree, mesh, forcing_periods) = match at {
-            Solution::Equilibrium(_) => (1, Mesh::from([]), 0),
+            Solution::Equilibrium(_) | Solution::Torus(_) => (1, Mesh::from([]), 0),
             Solution::Cycle(cycle) => (cycle.degree, cycle.mesh.clone(), cycle.forcing_periods),
         };
         Some(OnSurfaces {

@@ -76,7 +76,7 @@ impl Sliding<'_> {
                 all.retain(|own| jumps(self.field, &at.parameters, &own.state, own.time, &own.signs, self.switch));
                 all
             }
-            Solution::Equilibrium(_) => Vec::new(),
+            Solution::Equilibrium(_) | Solution::Torus(_) => Vec::new(),
         }
     }
 }

@@ -27,7 +27,7 @@ mod special;
 mod tests;
 mod variational;
 
-use crate::diagram::{Branch, Diagram, Kind, Solution};
+use crate::diagram::{Branch, Diagram, Family, Kind, Solution};
 use crate::explore::{System, axis_of};
 use crate::problem::{Axis, Setting};
 
@@ -179,6 +179,17 @@ pub fn verify(
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
         let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
+        if branch.family == Family::Torus {
+            let undecided = |position: i64, special: Option<Kind>| Undecided {
+                branch: branch.name.clone(),
+                position,
+                special,
+                why: "tori are not recomputed yet",
+            };
+            out.undecided.extend(chosen.iter().map(|i| undecided(branch.points[*i].position, None)));
+            out.undecided.extend(branch.special.iter().map(|own| undecided(own.point.position, Some(own.kind))));
+            continue;
+        }
         if system.is_open() || connecting {
             out.add(arcs::verify(system, branch, &chosen, accuracies(tolerance)[0]));
             continue;

@@ -172,6 +172,7 @@ impl Place<'_> {
     fn solutions(&self, nodes: &[f64; 4]) -> Result<Option<Vec<Nearby>>, &'static str> {
         match &self.special.point.solution {
             Solution::Equilibrium(x) => Ok(self.equilibria(x, nodes)),
+            Solution::Torus(_) => Err("tori are not recomputed"),
             Solution::Cycle(_) if self.special.point.is_light() => Err("its profile was not stored"),
             Solution::Cycle(_) if self.setting.field.iterated() => {
                 if !maps::recomputes(self.special.kind) {

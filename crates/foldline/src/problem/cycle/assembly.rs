@@ -8,6 +8,7 @@ use crate::linalg::max_abs;
 use crate::linalg::system::{System, either};
 use crate::problem::gauss::Scheme;
 use crate::problem::piecewise::{self, Switched};
+use std::sync::Arc;
 
 impl CycleProblem<'_> {
     /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period),
@@ -67,14 +68,12 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache. The `rows` act through
-    /// [`crate::contract::ZeroProblem::dot`].
+    /// Linearises at `u`, fills the blocks and condenses them. Returns the intervals in which the orbit switches.
     ///
     /// # Errors
     /// [`Singular`] if the block of an interval is.
-    pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+    pub(super) fn condense_all(&mut self, u: &[f64]) -> Result<Arc<Vec<Switched>>, Singular> {
         let (lanes, size) = (self.lanes(), self.profile_size());
-        self.lay_phase();
         self.gather(u);
         let known = self.setting.at(&u[size + 1..]);
         let parameters = Parameters::Shared(&known);
@@ -100,9 +99,23 @@ impl CycleProblem<'_> {
             phase: &self.phase,
             coupled: &self.coupled,
         };
-        let (q, first) = (self.system.shape().1, 1 + self.integrals());
-        let (trace, corner) = either!(&mut self.system, s => (write(linear, s)?, &mut s.corner));
+        let trace = either!(&mut self.system, s => write(linear, s)?);
         self.trace = trace + switched.iter().map(Switched::trace).sum::<f64>();
+        Ok(switched)
+    }
+
+    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache. The `rows` act through
+    /// [`crate::contract::ZeroProblem::dot`].
+    ///
+    /// # Errors
+    /// [`Singular`] if the block of an interval is.
+    pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        let size = self.profile_size();
+        self.lay_phase();
+        let switched = self.condense_all(u)?;
+        let known = self.setting.at(&u[size + 1..]);
+        let (q, first) = (self.system.shape().1, 1 + self.integrals());
+        let corner = either!(&mut self.system, s => &mut s.corner);
         corner.fill(0.0);
         corner[0] = f64::from(u8::from(self.forcing_periods > 0));
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
@@ -140,7 +153,7 @@ impl CycleProblem<'_> {
     }
 
     /// Writes a border row that acts on the profile through the inner product.
-    fn fill_row(&mut self, r: usize, row: &[f64]) {
+    pub(super) fn fill_row(&mut self, r: usize, row: &[f64]) {
         let (n, m) = (self.n, self.scheme.degree);
         let weights: Vec<f64> = (0..m * n)
             .map(|k| self.scheme.weights[k / n] / (self.scale[k % n] * self.scale[k % n] * n as f64))

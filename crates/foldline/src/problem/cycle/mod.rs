@@ -37,6 +37,7 @@ mod meshes;
 mod open;
 mod phase;
 mod residual;
+mod segment;
 
 use super::defect;
 use super::gauss::Scheme;
@@ -745,6 +746,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let (mut u, period) = match &point.solution {
             Solution::Cycle(cycle) => (cycle.profile.clone(), cycle.period),
             Solution::Equilibrium(x) => (x.iter().copied().cycle().take(self.profile_size()).collect(), 1.0),
+            Solution::Torus(torus) => (vec![f64::NAN; self.profile_size()], torus.period),
         };
         u.push(if self.is_forced() { f64::from(self.forcing_periods) } else { period });
         u.extend(self.setting.unknowns_of(point));

@@ -52,7 +52,7 @@ impl<'s, 'f> Uncertain<'s, 'f> {
     pub(super) fn new(setting: &'s Setting<'f>, at: &'s Point, error: f64) -> Uncertain<'s, 'f> {
         let state = match &at.solution {
             Solution::Equilibrium(x) => x.as_slice(),
-            Solution::Cycle(_) => &[],
+            Solution::Cycle(_) | Solution::Torus(_) => &[],
         };
         let sizes: Vec<f64> = state.iter().zip(setting.scales).map(|(x, s)| x.abs() + s).collect();
         // Backward error of a linear system with n unknowns.

@@ -1,0 +1,121 @@
+//! Tori that leave a cycle at a torus point, or begin on a cycle on which a forcing does not act yet.
+//!
+//! **Idea.** Near a torus point the torus is the cycle with a small rotating perturbation. A first one is found by Newton's
+//! method at a prescribed amplitude, as for other branches; the parameter follows, on whichever side the torus lies.
+
+use super::System;
+use super::growth::{Beginning, setting};
+use super::plan::{Plan, SeedPlan, SeedSource};
+use super::seeds::first_of;
+use super::switch::{DISTANCES, joined, step_off};
+use super::unforced::{Unforced, acts};
+use crate::continuation::{Settings, Station};
+use crate::contract::{Examination, ZeroProblem};
+use crate::diagram::{Cycle, Point, Solution, SpecialPoint};
+use crate::problem::torus::{TorusProblem, start};
+use num_complex::Complex64;
+
+/// Why tori of a model cannot be computed, if they cannot.
+pub fn unsupported(system: &System) -> Option<&'static str> {
+    let angles = system.field.periods().iter().any(|period| period.is_finite());
+    match system.field {
+        field if field.iterated() => Some("tori of maps, which are closed curves, are not supported"),
+        field if field.conditions() != [0, 0] => Some("a boundary-value problem has no tori"),
+        field if field.switch_count() > 0 => {
+            Some("tori of models whose right-hand side switches are not supported; smooth the switch")
+        }
+        _ if angles => Some("tori of models with angles are not supported"),
+        _ => None,
+    }
+}
+
+/// The start of the branch of tori that bifurcates from a cycle at a torus point.
+///
+/// # Errors
+/// A sentence that says why no torus was found.
+pub(super) fn born(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    at: &SpecialPoint,
+    cycle: &Cycle,
+) -> Result<Beginning, String> {
+    if let Some(why) = unsupported(system) {
+        return Err(why.into());
+    }
+    let own = setting(system, free, &at.point.parameters);
+    let neutral = |z: &&Complex64| z.im > 0.0;
+    let off = |z: &Complex64| z.norm().ln().abs();
+    let critical = at.point.free_spectrum().iter().filter(neutral).min_by(|a, b| off(a).total_cmp(&off(b)));
+    let critical = *critical.ok_or("no complex pair of multipliers was found")?;
+    if let Some(order) = strong_resonance(critical) {
+        return Err(format!(
+            "the multipliers are close to a root of 1 of order {order} (strong resonance), where the motion is not a torus"
+        ));
+    }
+    let (torus, around) =
+        start::at_torus_point(own.clone(), cycle, critical).ok_or("the direction of the multiplier was not found")?;
+    let mut problem = TorusProblem::like(own, &torus, None);
+    let there = Point { solution: Solution::Torus(torus.clone()), ..at.point.clone() };
+    let base = problem.unknowns_of(&there);
+    let mut direction = around;
+    direction.resize(base.len(), 0.0);
+    let expected = |_: &dyn ZeroProblem, _: &Station| true;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &DISTANCES[..4], &expected)
+        .map_err(|why| why.to_string())?;
+    // The special point as a torus of amplitude zero.
+    problem.set_mesh(&torus.mesh);
+    problem.anchor(&base.iter().zip(&direction).map(|(u, d)| u + d).collect::<Vec<_>>());
+    let norm = problem.dot(&direction, &direction).sqrt();
+    let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
+    let mut edge = problem.point(&base, &tangent, Examination::default());
+    edge.parameters.clone_from(&at.point.parameters);
+    (edge.ranges, edge.averages) = (at.point.ranges.clone(), at.point.averages.clone());
+    edge.trust = at.point.trust;
+    let forced = cycle.forcing_periods > 0;
+    edge.spectrum = vec![Complex64::new(1.0, 0.0); if forced { 1 } else { 2 }];
+    let others = at.point.free_spectrum().iter().filter(|z| (**z - critical).norm() > 1e-12);
+    let others = others.filter(|z| (**z - critical.conj()).norm() > 1e-12).copied();
+    edge.spectrum.extend(std::iter::once(Complex64::new(1.0, 0.0)).chain(others));
+    Ok(Beginning::Edge { before: vec![edge], first, joined: joined(at, free) })
+}
+
+/// Order, up to 4, of the root of 1 to which a multiplier on the unit circle is close.
+fn strong_resonance(z: Complex64) -> Option<u32> {
+    const CLOSE: f64 = 2e-3;
+    (1..=4).find(|order| (z.powu(*order) - 1.0).norm() < CLOSE * f64::from(*order))
+}
+
+/// The torus that a cycle is, at parameters at which the forcing does not act: the cycle is found without forcing, from
+/// the source of the seed.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub(super) fn lifted(
+    system: &System,
+    plan: &Plan,
+    seed: &SeedPlan,
+    source: &SeedSource,
+    jobs: usize,
+) -> Result<Point, String> {
+    if let Some(why) = unsupported(system) {
+        return Err(why.into());
+    }
+    if !system.field.forced() {
+        return Err("a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into());
+    }
+    if acts(system.field, &seed.parameters, &system.ranges) {
+        return Err("the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
+                    not act, so set its amplitude to zero there"
+            .into());
+    }
+    let field = Unforced(system.field);
+    let alone = System { field: &field, ..system.clone() };
+    let own = SeedPlan { source: source.clone(), ..seed.clone() };
+    let point = first_of(&alone, own, plan, jobs)?;
+    let Solution::Cycle(cycle) = &point.solution else {
+        return Err("without the forcing the seed leads to an equilibrium, on which the forcing causes a cycle".into());
+    };
+    let torus = start::lifted(cycle, system.field.time_unit(&seed.parameters));
+    Ok(Point { solution: Solution::Torus(torus), tangent: Vec::new(), ..point })
+}
