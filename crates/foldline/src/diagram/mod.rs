@@ -357,7 +357,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 26] = [
+    pub const ALL: [Kind; 27] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -380,6 +380,7 @@ impl Kind {
         Kind::DoubleTorus,
         Kind::Grazing,
         Kind::Sliding,
+        Kind::ImpactGrazing,
         Kind::BoundaryEquilibrium,
         Kind::Mark,
         Kind::Peak,
@@ -390,7 +391,7 @@ impl Kind {
     pub fn has_codimension_two(self) -> bool {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
-            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::Peak)
+            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::ImpactGrazing | Kind::Peak)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -436,6 +437,7 @@ impl Kind {
             Kind::DoubleTorus => "double-torus",
             Kind::Grazing => "grazing",
             Kind::Sliding => "sliding",
+            Kind::ImpactGrazing => "impact-grazing",
             Kind::BoundaryEquilibrium => "boundary-equilibrium",
             Kind::Mark => "mark",
             Kind::Peak => "peak",
@@ -460,6 +462,7 @@ impl Kind {
             Kind::Resonance13 => "1:3 resonance",
             Kind::Resonance14 => "1:4 resonance",
             Kind::DoubleTorus => "double torus",
+            Kind::ImpactGrazing => "impact grazing",
             Kind::BoundaryEquilibrium => "boundary equilibrium",
             other => other.name(),
         }
