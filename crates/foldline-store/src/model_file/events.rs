@@ -106,7 +106,7 @@ impl Reader<'_> {
         let Some(table) = self.walk.table(value, &whose) else { return };
         let before = self.walk.found.len();
         self.walk.only(table, &CONTACT, &whose);
-        let mut missing = |reader: &mut Self, key: &str, hint: &str| {
+        let missing = |reader: &mut Self, key: &str, hint: &str| {
             reader.walk.report(place.clone(), format!("{whose} has no `{key}`"), hint);
         };
         let Some(at) = table.get("at") else {
@@ -257,7 +257,10 @@ fn impacts(
             name: name.to_string(),
             when: format!("hypot({u}, {v}) - ({clearance})"),
             direction: Passing::Up,
-            set: vec![Definition::new(du, &format!("{du} - {loss}*{u}")), Definition::new(dv, &format!("{dv} - {loss}*{v}"))],
+            set: vec![
+                Definition::new(du, &format!("{du} - {loss}*{u}")),
+                Definition::new(dv, &format!("{dv} - {loss}*{v}")),
+            ],
             allowed: None,
         }];
     }

@@ -345,6 +345,8 @@ pub enum Kind {
     Grazing,
     /// A cycle begins or ceases to slide along a switching surface of the vector field.
     Sliding,
+    /// An event of a cycle, such as an impact, loses its speed, or a cycle touches the surface of an event without speed.
+    ImpactGrazing,
     /// An equilibrium lies on a switching surface of the vector field.
     BoundaryEquilibrium,
     /// A quantity has a requested value.
@@ -735,6 +737,16 @@ impl fmt::Display for Ending {
             }
             Ending::Joined { at: Kind::PeriodDoubling, parameter } => {
                 write!(f, "became a cycle of half the period at {:.6}", Shown(*parameter))
+            }
+            Ending::Joined { at: Kind::ImpactGrazing, parameter } => {
+                write!(
+                    f,
+                    "ends at an impact grazing at {:.9}: beyond it the cycle has another sequence of impacts",
+                    Shown(*parameter)
+                )
+            }
+            Ending::Joined { at: Kind::BoundaryEquilibrium, parameter } => {
+                write!(f, "ends at {:.9}, where the equilibrium reaches the surface of an event", Shown(*parameter))
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),

@@ -3,11 +3,12 @@
 use super::counted::Counted;
 use super::plan::Holds;
 use super::symmetry::{is_rotating_wave, rotation};
-use super::{System, corner};
+use super::{System, corner, impacts as beside_impacts};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::problem::impact::{ImpactProblem, stored::impacts};
 use crate::problem::map::MapProblem;
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
@@ -18,7 +19,7 @@ use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
-use crate::special::{self, collapse, grazing, sliding};
+use crate::special::{self, collapse, grazing, impact, sliding};
 use std::cell::RefCell;
 
 /// The curve through a point that is to be followed.
@@ -135,6 +136,11 @@ pub fn surface<'a>(
     doubled: bool,
 ) -> Box<dyn ZeroProblem + 'a> {
     let setting = setting_of(system, axes, point);
+    if let Solution::Cycle(cycle) = &point.solution
+        && let Some(problem) = ImpactProblem::like(setting.clone(), cycle)
+    {
+        return Box::new(problem);
+    }
     match &point.solution {
         solution if system.field.iterated() => Box::new(MapProblem::like(setting, solution)),
         Solution::Equilibrium(_) if kind == Some(Kind::BranchPoint) => Box::new(EquilibriumProblem::unfolded(setting)),
@@ -176,7 +182,7 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
         reflections: system.reflections.clone(),
         periods,
         max_points,
-        kinks: system.field.switch_count(),
+        kinks: system.field.switch_count() - system.field.event_count(),
         ..usual
     }
 }
@@ -233,7 +239,7 @@ fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poi
 }
 
 /// Returns the tangent of the curve at `u`, a point close to it.
-fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
+pub(super) fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
     // Any row serves for the first tangent unless it is orthogonal to it.
     let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
     let mut last = vec![0.0; u.len()];
@@ -579,6 +585,9 @@ impl Growth<'_> {
             if branch.family == Family::Cycle {
                 marks.extend(sliding::monitors(system.field));
             }
+            if branch.held.is_none() {
+                marks.extend(impact::monitors(system.field, branch.family == Family::Cycle));
+            }
         }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none());
         let home = home.map(|point| Point { unstable: counted_at(point), ..point.clone() });
@@ -589,9 +598,8 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
-        let (free, corners) =
-            (branch.free, branch.held.is_none() && system.holds.is_none() && system.field.switch_count() > 0);
-        let free_cycles = branch.held.is_none() && !system.field.forced();
+        let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
+        let (branch_free, free_cycles) = (branch.free, branch.held.is_none() && !system.field.forced());
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -612,7 +620,7 @@ impl Growth<'_> {
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
-        let mut record = Record::at(&last, side == 1);
+        let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let mut sink = |item: Item| {
@@ -634,13 +642,13 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    let misfit = record.special(&special);
+                    let misfit = record.borrow_mut().special(&special);
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
-                    let before = record.point(&point).filter(|_| recorded);
+                    let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
             };
@@ -668,6 +676,41 @@ impl Growth<'_> {
         if let Ending::Joined { at: Kind::Grazing, parameter } = ending {
             ending =
                 Ending::StepTooSmall(format!("no direction was found in which the branch continues at {parameter}"));
+        }
+        // Beyond an impact grazing the branch goes on with another sequence of events.
+        for _ in 0..CORNERS {
+            if !matches!(ending, Ending::Joined { at: Kind::ImpactGrazing, .. }) || self.observer.stopping() {
+                break;
+            }
+            let there = latest.borrow().clone();
+            let Some((mut problem, mut next)) =
+                beside_impacts::beyond(&system, self.settings, branch_free, &there, direction)
+            else {
+                break;
+            };
+            let position = there.position + if side == 1 { 1 } else { -1 };
+            next.point.position = position;
+            record.replace(Record::at(&next.point, side == 1));
+            let mut walk = Follow {
+                problem: &mut *problem,
+                settings: self.settings,
+                monitors: &monitors,
+                marks: &marks,
+                collapses: &collapses,
+                limit: &|at| limits.approached(at).filter(|_| free_cycles),
+                corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
+                direction,
+                symmetric,
+                holds: false,
+                free: branch_free,
+                home: home.as_ref(),
+                homecoming: Homecoming::default(),
+                inspected: 0.0,
+            };
+            ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
+                true => Ending::Stopped,
+                false => follow(&mut walk, next, None, position.unsigned_abs() as usize, &mut sink),
+            };
         }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
@@ -728,11 +771,38 @@ impl Growth<'_> {
         }
     }
 
+    /// Says what becomes of the branch at an impact grazing.
+    fn at_impact_grazing(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
+        let towards = if side == 1 { 1.0 } else { -1.0 };
+        let found = beside_impacts::beyond(system, self.settings, branch.free, &special.point, towards);
+        let kind = match found {
+            None => "no cycle with the other sequence was found beside it",
+            Some((_, next)) => {
+                let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+                let before = -towards * special.point.parameter_slope();
+                match (value(&next.point) - value(&special.point)) * before > 0.0 {
+                    true => "non-smooth fold",
+                    false => "persistence",
+                }
+            }
+        };
+        Coefficients { remark: format!("{kind}: {}", special.remark), ..Coefficients::default() }
+    }
+
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         if special.kind == Kind::Peak {
             return Coefficients { remark: self.peak(branch, special), ..Coefficients::default() };
+        }
+        if special.kind == Kind::ImpactGrazing {
+            return self.at_impact_grazing(system, branch, side, special);
+        }
+        if let Solution::Cycle(cycle) = &special.point.solution
+            && !impacts(system.field, &special.point.parameters, cycle).is_empty()
+            && special.kind != Kind::Mark
+        {
+            return Coefficients::none("normal forms of cycles with impacts are not computed");
         }
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {

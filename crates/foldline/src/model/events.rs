@@ -70,9 +70,7 @@ pub(super) fn parse(check: &mut Check, states: &[State]) -> Parsed {
             check.report(item, Field::Name, "the event changes no state", hint);
         }
         parsed.set.push(set);
-        parsed.allowed.push(
-            event.allowed.as_ref().and_then(|text| check.parse(item, Field::Allowed, text, &[])),
-        );
+        parsed.allowed.push(event.allowed.as_ref().and_then(|text| check.parse(item, Field::Allowed, text, &[])));
     }
     parsed
 }
@@ -174,7 +172,7 @@ impl Model {
     }
 
     /// The first event that does not allow a state, by index.
-    pub(super) fn forbidden(&self, at: Batch) -> Option<usize> {
+    pub(super) fn first_forbidden(&self, at: Batch) -> Option<usize> {
         let events = &self.inner.compiled.events;
         let places: Vec<usize> = (0..events.len()).filter(|k| events[*k].allowed.is_some()).collect();
         if places.is_empty() {

@@ -55,8 +55,8 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Boundary, Constant, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter, Passing, Repeat, Spread,
-    State, Total,
+    Boundary, Constant, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter, Passing,
+    Repeat, Spread, State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
@@ -625,7 +625,7 @@ impl VectorField for Model {
     }
 
     fn forbidden(&self, at: Batch) -> Option<usize> {
-        Model::forbidden(self, at)
+        self.first_forbidden(at)
     }
 
     fn slopes_in_time(&self, at: Batch, out: &mut [f64]) {

@@ -152,6 +152,7 @@ pub fn of_point(system: &System, branch: &Branch, point: &Point, plan: &Plan) ->
 fn not_posed(system: &System, branch: &Branch) -> Option<&'static str> {
     match branch {
         _ if system.is_open() => Some("sensitivities of boundary-value problems are not computed"),
+        _ if system.field.event_count() > 0 => Some("sensitivities of models with events are not computed"),
         branch if !branch.also.is_empty() => Some("sensitivities along a branch with held quantities are not computed"),
         _ => None,
     }

@@ -49,21 +49,27 @@ pub fn monitors<'a>(field: &'a dyn VectorField, cycles: bool) -> Vec<Box<dyn Mon
     }
     match cycles {
         true => [false, true].map(|touches| Box::new(Grazes { field, touches }) as Box<dyn Monitor>).into(),
-        false => {
-            (0..field.event_count()).map(|event| Box::new(Rests { field, event }) as Box<dyn Monitor>).collect()
-        }
+        false => (0..field.event_count()).map(|event| Box::new(Rests { field, event }) as Box<dyn Monitor>).collect(),
     }
 }
 
-/// Numbers of events of a cycle, their names in order, and Σ |x⁺ - x⁻| of the largest change of each.
+/// The events of a cycle.
 #[derive(Clone, Debug, Default)]
 pub struct Sequence {
     /// Number of events per period.
     pub count: usize,
-    /// Names of the events, in order.
-    pub names: Vec<String>,
+    /// Names of the events, in order, and the share of the period at which each occurs.
+    pub names: Vec<(String, f64)>,
     /// Sum over the events of the largest change of a state.
     pub change: f64,
+}
+
+impl Sequence {
+    /// The events as text: the share of the period at which each occurs, and its name.
+    pub fn text(&self) -> String {
+        let each: Vec<String> = self.names.iter().map(|(name, time)| format!("{time:.3}: {name}")).collect();
+        each.join("; ")
+    }
 }
 
 /// The events of a cycle.
@@ -73,7 +79,7 @@ pub fn sequence(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> S
     let change = |own: &Impact| own.after.iter().zip(&own.before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     Sequence {
         count: all.len(),
-        names: all.iter().map(|own| field.switch_name(first + own.event)).collect(),
+        names: all.iter().map(|own| (field.switch_name(first + own.event), own.time)).collect(),
         change: all.iter().map(change).sum(),
     }
 }
@@ -106,8 +112,8 @@ pub fn inadmissible(field: &dyn VectorField, at: &Point) -> Option<String> {
     if slow {
         return Some("an event is passed in the wrong direction".into());
     }
-    let (most, size) = highest(field, &at.parameters, cycle);
-    (most > 1e-9 * size).then(|| "it passes the surface of an event without it".into())
+    let highest = highest(field, &at.parameters, cycle);
+    (highest.value > 1e-9 * highest.size).then(|| "it passes the surface of an event without it".into())
 }
 
 /// v of (1) of all events of a cycle.
@@ -141,8 +147,19 @@ fn sign(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, own: &Impact
     -surfaces(field, parameters, &cycle.profile[inside], &times_of(cycle, time))[own.event].signum()
 }
 
-/// The largest of the maxima (2), of all events, and the largest value of a switch. Minus the latter without any.
-fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> (f64, f64) {
+/// The largest of the maxima (2) of all events.
+pub(crate) struct Highest {
+    /// Its value; minus the size if there is no maximum.
+    pub value: f64,
+    /// Largest value of a switch.
+    pub size: f64,
+    /// Normalised time, and the event.
+    pub time: f64,
+    pub event: usize,
+}
+
+/// The largest of the maxima (2).
+pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Highest {
     let all = impacts(field, parameters, cycle);
     let (n, count, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
     let block = (cycle.degree + 1) * n;
@@ -163,10 +180,12 @@ fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> (f64, 
             (0..all.len()).map(|k| [end(k), end(k + 1)]).collect()
         }
     };
-    let (mut most, mut size) = (f64::NEG_INFINITY, 0.0f64);
+    let (mut most, mut size, mut where_) = (f64::NEG_INFINITY, 0.0f64, (0.0, 0));
     for [first, last] in flights {
-        let places: Vec<f64> =
-            (first * SECTIONS..last * SECTIONS).map(|k| k as f64 / SECTIONS as f64).chain([last as f64 - 1e-12]).collect();
+        let places: Vec<f64> = (first * SECTIONS..last * SECTIONS)
+            .map(|k| k as f64 / SECTIONS as f64)
+            .chain([last as f64 - 1e-12])
+            .collect();
         let values: Vec<Vec<f64>> = places.iter().map(|place| at(*place)).collect();
         for event in 0..field.event_count() {
             let own: Vec<f64> = values.iter().map(|all| all[event]).collect();
@@ -179,12 +198,19 @@ fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> (f64, 
                 let own: Vec<f64> = own.iter().map(|h| sign * h).collect();
                 for k in maxima(&own, all.is_empty()) {
                     let course = |place: f64| sign * at(place)[event];
-                    most = most.max(refined([places[k - 1], places[k], places[k + 1]], own[k], &course));
+                    let around = [places[k - 1], places[k], places[k + 1]];
+                    let (place, value) = refined(around, own[k], &course);
+                    if value > most {
+                        (most, where_) = (value, (place, event));
+                    }
                 }
             }
         }
     }
-    (if most.is_finite() { most } else { -size }, size)
+    let (place, event) = where_;
+    let j = (place.floor() as usize) % count;
+    let time = cycle.mesh[j] + (place - place.floor()) * (cycle.mesh[j + 1] - cycle.mesh[j]);
+    Highest { value: if most.is_finite() { most } else { -size }, size, time, event }
 }
 
 /// Local maxima of samples that are not at an end: on a flight between events, those between two minima. A stretch at
@@ -199,8 +225,9 @@ fn maxima(values: &[f64], closed: bool) -> Vec<usize> {
     (1..last).filter(|k| *k >= below && inner(*k) && between(*k)).collect()
 }
 
-/// Value of the maximum between three places.
-fn refined(mut t: [f64; 3], mut best: f64, at: &dyn Fn(f64) -> f64) -> f64 {
+/// Place and value of the maximum between three places.
+fn refined(mut t: [f64; 3], value: f64, at: &dyn Fn(f64) -> f64) -> (f64, f64) {
+    let mut best = (t[1], value);
     for _ in 0..ROUNDS {
         let v = t.map(at);
         let (a, b) = ((v[1] - v[0]) / (t[1] - t[0]), (v[2] - v[1]) / (t[2] - t[1]));
@@ -209,7 +236,10 @@ fn refined(mut t: [f64; 3], mut best: f64, at: &dyn Fn(f64) -> f64) -> f64 {
         if !(place > t[0] && place < t[2]) {
             return best;
         }
-        best = best.max(at(place));
+        let there = (place, at(place));
+        if there.1 >= best.1 {
+            best = there;
+        }
         let step = (0.125 * (t[2] - t[0])).min(place - t[0]).min(t[2] - place);
         if step < 1e-9 {
             return best;
@@ -227,7 +257,7 @@ impl Monitor for Grazes<'_> {
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let Solution::Cycle(cycle) = &at.solution else { return f64::NAN };
         if self.touches {
-            return -highest(self.field, &at.parameters, cycle).0;
+            return -highest(self.field, &at.parameters, cycle).value;
         }
         let least = speeds(self.field, &at.parameters, cycle).into_iter().fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 1.0 }

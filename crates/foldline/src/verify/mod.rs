@@ -177,8 +177,11 @@ pub fn verify(
         let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
-        if system.is_open() {
-            let why = "solutions of boundary-value problems are not recomputed yet";
+        if system.is_open() || system.field.event_count() > 0 {
+            let why = match system.is_open() {
+                true => "solutions of boundary-value problems are not recomputed yet",
+                false => "solutions of models with events are not recomputed yet",
+            };
             let undecided = |position: i64, special: Option<Kind>| Undecided {
                 branch: branch.name.clone(),
                 position,

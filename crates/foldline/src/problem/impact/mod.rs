@@ -28,7 +28,7 @@ pub(crate) mod stored;
 use super::cycle::CycleProblem;
 use super::gauss::Scheme;
 use super::{Axis, Setting, averages, extremes};
-use crate::contract::{Batch, Examination, Parameters, Singular, VectorField, ZeroProblem};
+use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::dot;
 use crate::stability::floquet::{self, Course, Floquet, Frames};
@@ -64,7 +64,12 @@ impl<'a> ImpactProblem<'a> {
     }
 
     /// Cycles with the events, and on the mesh, of those flights.
-    pub(crate) fn of(setting: Setting<'a>, degree: usize, forcing_periods: u32, flights: &Flights) -> ImpactProblem<'a> {
+    pub(crate) fn of(
+        setting: Setting<'a>,
+        degree: usize,
+        forcing_periods: u32,
+        flights: &Flights,
+    ) -> ImpactProblem<'a> {
         let field = setting.field;
         let total: f64 = flights.flights.iter().map(|(last, _)| last).sum();
         let scales = flights.events.iter().flat_map(|_| setting.scales.iter().copied().chain([total])).collect();
@@ -206,13 +211,15 @@ impl<'a> ImpactProblem<'a> {
         let intervals = mesh.len() - 1;
         let mut end = vec![0.0; all];
         scheme.value_into(1.0, &u[(intervals - 1) * block..intervals * block], &mut end);
-        let (mut chain, mut flow, mut time) = (Vec::new(), Vec::new(), if self.is_forced() { u[self.size_on(mesh) + 1] } else { 0.0 });
+        let (mut chain, mut flow, mut time) =
+            (Vec::new(), Vec::new(), if self.is_forced() { u[self.size_on(mesh) + 1] } else { 0.0 });
         for i in 0..count {
             let own = i * (n + 1)..i * (n + 1) + n;
             time += u[own.end];
             let times = if self.is_forced() { vec![time] } else { Vec::new() };
             for (j, all_of) in transitions.chunks_exact(all * all).enumerate() {
-                own.clone().for_each(|row| chain.extend_from_slice(&all_of[row * all + own.start..row * all + own.end]));
+                own.clone()
+                    .for_each(|row| chain.extend_from_slice(&all_of[row * all + own.start..row * all + own.end]));
                 if !self.is_forced() {
                     let x = &u[j * block + own.start..j * block + own.end];
                     flow.extend(self.rates(&parameters, x, &[]));
@@ -256,14 +263,29 @@ impl<'a> ImpactProblem<'a> {
         Some(self.floquet(&better, &fine, &transitions).multipliers)
     }
 
-    /// Flights of a stored point, in the order of this problem.
-    fn flights_of(&self, point: &Point) -> Option<Flights> {
+    /// Flights of a stored point, in the order of this problem, and the one of the stored order with which they begin.
+    fn flights_of(&self, point: &Point) -> Option<(Flights, usize)> {
         let Solution::Cycle(cycle) = &point.solution else { return None };
         if cycle.degree != self.degree {
             return None;
         }
         let found = Flights::of(self.setting.field, &point.parameters, cycle)?;
-        found.beginning(&self.segments.events, self.phase.get(), self.segments.forcing_periods)
+        let (q, phase) = (self.segments.forcing_periods, self.phase.get());
+        let first = found.beginning(&self.segments.events, phase, q)?;
+        Some((found.starting(first, q, phase), first))
+    }
+
+    /// A direction in which the flights begin with another one.
+    fn rotated(&self, v: &[f64], first: usize) -> Vec<f64> {
+        let (n, all) = (self.n(), self.scales.len());
+        let scalars = 1 + self.axes.len();
+        let Some(size) = v.len().checked_sub(scalars).filter(|size| size % all == 0) else { return v.to_vec() };
+        let mut out = v.to_vec();
+        out[..size].chunks_exact_mut(all).for_each(|row| row.rotate_left(first * (n + 1)));
+        if self.is_forced() {
+            out[size + 1] += (0..first).map(|j| v[j * (n + 1) + n]).sum::<f64>();
+        }
+        out
     }
 }
 
@@ -362,7 +384,13 @@ impl ZeroProblem for ImpactProblem<'_> {
             let times = stored::times_of(&cycle, impact.time);
             for x in [&impact.before, &impact.after] {
                 let mut outputs = vec![0.0; field.output_count()];
-                let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
+                let at = Batch {
+                    lanes: 1,
+                    states: x,
+                    parameters: Parameters::Shared(&parameters),
+                    times: &times,
+                    signs: &[],
+                };
                 field.outputs(at, &mut outputs);
                 for (range, value) in found.ranges.iter_mut().zip(x.iter().chain(&outputs)) {
                     *range = [range[0].min(*value), range[1].max(*value)];
@@ -385,11 +413,14 @@ impl ZeroProblem for ImpactProblem<'_> {
         let parameters = self.parameters_at(u);
         let q = self.segments.forcing_periods;
         let unit = if q > 0 { self.setting.field.time_unit(&parameters) } else { 1.0 };
+        let flights = self.flights(u, &self.mesh());
+        // Stored flights begin with the first one of the period.
+        let first = if q > 0 { flights.first(q) } else { 0 };
         Point {
             position: 0,
-            solution: Solution::Cycle(self.flights(u, &self.mesh()).cycle(self.degree, q, unit)),
+            solution: Solution::Cycle(flights.cycle(self.degree, q, unit)),
             parameters,
-            tangent: tangent.to_vec(),
+            tangent: self.rotated(tangent, first),
             step: 0.0,
             spectrum: examination.spectrum,
             unstable: examination.unstable,
@@ -403,7 +434,7 @@ impl ZeroProblem for ImpactProblem<'_> {
     /// The mesh becomes that of the point.
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         match self.flights_of(point) {
-            Some(flights) => {
+            Some((flights, _)) => {
                 self.set_mesh(&flights.mesh);
                 self.unknowns_with(&flights, &point.parameters)
             }
@@ -415,14 +446,14 @@ impl ZeroProblem for ImpactProblem<'_> {
         if reflection.contains(&true) {
             return Vec::new();
         }
-        let Some(flights) = self.flights_of(point) else { return Vec::new() };
+        let Some((flights, first)) = self.flights_of(point) else { return Vec::new() };
         let mesh = self.mesh();
         let own = self.unknowns_with(&flights, &point.parameters);
         if point.tangent.len() != own.len() {
             return Vec::new();
         }
         let u = self.transfer(&own, &flights.mesh, &mesh);
-        let tangent = self.transfer(&point.tangent, &flights.mesh, &mesh);
+        let tangent = self.transfer(&self.rotated(&point.tangent, first), &flights.mesh, &mesh);
         let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
         if self.dot(&off, &off) <= within * within { vec![[u, tangent]] } else { Vec::new() }
     }

@@ -86,6 +86,21 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
     found
 }
 
+/// The cycle with a mesh node at a time, and the interval that ends there.
+pub(crate) fn with_node(cycle: &Cycle, t: f64) -> (Cycle, usize) {
+    let (n, scheme) = (cycle.dim(), Scheme::of(cycle.degree));
+    let block = (cycle.degree + 1) * n;
+    let next = cycle.mesh.partition_point(|node| *node <= t).clamp(1, cycle.intervals());
+    let [a, b] = [cycle.mesh[next - 1], cycle.mesh[next]];
+    let s = (t - a) / (b - a);
+    let nodes = &cycle.profile[(next - 1) * block..next * block];
+    let [left, right] = [[0.0, s], [s, 1.0]].map(|ends| part(scheme, nodes, ends, n));
+    let mut mesh = cycle.mesh.to_vec();
+    mesh.insert(next, t);
+    let profile = [&cycle.profile[..(next - 1) * block], &left, &right, &cycle.profile[next * block..]].concat();
+    (Cycle { mesh: mesh.into(), profile, ..cycle.clone() }, next - 1)
+}
+
 /// A cycle as its flights between events.
 #[derive(Clone, Debug)]
 pub(crate) struct Flights {
@@ -117,8 +132,16 @@ fn part(scheme: &Scheme, nodes: &[f64], [from, to]: [f64; 2], n: usize) -> Vec<f
 impl Flights {
     /// The flights of a cycle; `None` if it has no events.
     pub fn of(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Option<Flights> {
-        let impacts = impacts(field, parameters, cycle);
-        let (n, count, first) = (cycle.dim(), cycle.intervals(), impacts.first()?);
+        Flights::between(impacts(field, parameters, cycle), cycle)
+    }
+
+    /// The flights of a cycle between some of its events; `None` without any.
+    pub fn between(mut impacts: Vec<Impact>, cycle: &Cycle) -> Option<Flights> {
+        let (n, count) = (cycle.dim(), cycle.intervals());
+        // The event at the end of the period is the one at its beginning.
+        if impacts.last()?.interval + 1 == count {
+            impacts.rotate_right(1);
+        }
         let scheme = Scheme::of(cycle.degree);
         let forced = cycle.forcing_periods > 0;
         let unit = if forced { f64::from(cycle.forcing_periods) } else { cycle.period };
@@ -131,16 +154,17 @@ impl Flights {
         };
         let (mut events, mut parts) = (Vec::new(), Vec::new());
         for (i, own) in impacts.iter().enumerate() {
-            let (next, turn) = if i + 1 < impacts.len() { (&impacts[i + 1], 0) } else { (first, count) };
-            let mut pieces: Vec<Piece> = (own.interval + 1..=next.interval + turn).map(piece).collect();
-            let seam = (count - 1 - own.interval).min(count);
-            if forced && turn > 0 && seam > 0 && seam < pieces.len() {
-                join(&mut pieces, seam, scheme, n);
+            let next = &impacts[(i + 1) % impacts.len()];
+            let first = (own.interval + 1) % count;
+            let last = if next.interval >= first { next.interval } else { next.interval + count };
+            let mut pieces: Vec<Piece> = (first..=last).map(piece).collect();
+            if forced && first < count && count <= last && first > 0 {
+                join(&mut pieces, count - first, scheme, n);
             }
             events.push(next.event);
             parts.push(pieces);
         }
-        let phase = if forced { first.time * unit } else { 0.0 };
+        let phase = if forced { impacts[0].time % 1.0 * unit } else { 0.0 };
         Some(Flights::assembled(phase, events, parts, scheme, n))
     }
 
@@ -155,7 +179,8 @@ impl Flights {
         };
         let all: Vec<(f64, Mesh, Vec<f64>)> = parts.iter().map(course).collect();
         let first = &all[0].1;
-        let alike = |mesh: &Mesh| mesh.len() == first.len() && mesh.iter().zip(&first[..]).all(|(a, b)| (a - b).abs() < NODE);
+        let alike =
+            |mesh: &Mesh| mesh.len() == first.len() && mesh.iter().zip(&first[..]).all(|(a, b)| (a - b).abs() < NODE);
         let mesh = match all.iter().all(|(_, mesh, _)| alike(mesh)) {
             true => first.clone(),
             false => mesh::uniform(all.iter().map(|(_, mesh, _)| mesh.len() - 1).max().unwrap_or(1).max(8)),
@@ -171,21 +196,43 @@ impl Flights {
         Flights { phase, events, mesh, flights }
     }
 
-    /// The same flights, beginning with another one, so that the events are those given and the phase is closest to the
-    /// one given; `None` if the events are not those.
-    pub fn beginning(&self, events: &[usize], phase: f64, forcing_periods: u32) -> Option<Flights> {
-        let (count, q) = (self.events.len(), f64::from(forcing_periods));
-        let choices = (0..count).filter_map(|first| {
-            let mut own = self.clone();
-            own.events.rotate_left(first);
-            own.flights.rotate_left(first);
-            if q > 0.0 {
-                own.phase += self.flights[..first].iter().map(|(last, _)| last).sum::<f64>();
-                own.phase += q * ((phase - own.phase) / q).round();
-            }
-            (own.events == events).then_some(own)
-        });
-        choices.min_by(|a, b| (a.phase - phase).abs().total_cmp(&(b.phase - phase).abs()))
+    /// Numbers of flights with which the same flights may begin so that the events are those given; the one whose phase
+    /// is closest to the one given.
+    pub fn beginning(&self, events: &[usize], phase: f64, forcing_periods: u32) -> Option<usize> {
+        let off = |first: usize| {
+            let own = self.starting(first, forcing_periods, phase);
+            (own.events == events).then_some((first, (own.phase - phase).abs()))
+        };
+        (0..self.events.len()).filter_map(off).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(first, _)| first)
+    }
+
+    /// The same flights, beginning with another one, at the phase that is closest to the one given.
+    pub fn starting(&self, first: usize, forcing_periods: u32, phase: f64) -> Flights {
+        let (mut own, q) = (self.clone(), f64::from(forcing_periods));
+        own.events.rotate_left(first);
+        own.flights.rotate_left(first);
+        if q > 0.0 {
+            own.phase += self.flights[..first].iter().map(|(last, _)| last).sum::<f64>();
+            own.phase += q * ((phase - own.phase) / q).round();
+        }
+        own
+    }
+
+    /// Number of the flight that begins first within a period of a forced field.
+    pub fn first(&self, forcing_periods: u32) -> usize {
+        let (q, mut time) = (f64::from(forcing_periods), self.phase);
+        let mut starts = Vec::with_capacity(self.flights.len());
+        for (last, _) in &self.flights {
+            starts.push(time.rem_euclid(q));
+            time += last;
+        }
+        (0..starts.len()).min_by(|a, b| starts[*a].total_cmp(&starts[*b])).unwrap_or(0)
+    }
+
+    /// The flights of several turns.
+    pub fn turns(&self, count: usize) -> Flights {
+        let flights = (0..count).flat_map(|_| self.flights.iter().cloned()).collect();
+        Flights { events: self.events.repeat(count), flights, ..self.clone() }
     }
 
     /// The cycle; `unit` is the length of a forcing period, or 1.
