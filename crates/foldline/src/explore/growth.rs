@@ -623,6 +623,7 @@ impl Growth<'_> {
         let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
+        let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -630,6 +631,14 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
+                    let plain = special.clone();
+                    if special.kind == Kind::ImpactGrazing {
+                        let found =
+                            beside_impacts::beyond(&system, self.settings, branch.free, &special.point, direction);
+                        let next = found.as_ref().map(|(_, next)| next);
+                        self.tell_impacts(&system, branch, side, &mut special, next);
+                        beyond.replace(found);
+                    }
                     self.tell_folds(&system, branch, &mut special);
                     if branch.family == Family::Arc {
                         (special.unstable_before, special.unstable_after) = (0, 0);
@@ -642,7 +651,7 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    let misfit = record.borrow_mut().special(&special);
+                    let misfit = record.borrow_mut().special(&plain);
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
@@ -683,11 +692,7 @@ impl Growth<'_> {
                 break;
             }
             let there = latest.borrow().clone();
-            let Some((mut problem, mut next)) =
-                beside_impacts::beyond(&system, self.settings, branch_free, &there, direction)
-            else {
-                break;
-            };
+            let Some((mut problem, mut next)) = beyond.take() else { break };
             let position = there.position + if side == 1 { 1 } else { -1 };
             next.point.position = position;
             record.replace(Record::at(&next.point, side == 1));
@@ -771,22 +776,36 @@ impl Growth<'_> {
         }
     }
 
-    /// Says what becomes of the branch at an impact grazing.
-    fn at_impact_grazing(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
-        let towards = if side == 1 { 1.0 } else { -1.0 };
-        let found = beside_impacts::beyond(system, self.settings, branch.free, &special.point, towards);
-        let kind = match found {
-            None => "no cycle with the other sequence was found beside it",
-            Some((_, next)) => {
-                let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
-                let before = -towards * special.point.parameter_slope();
-                match (value(&next.point) - value(&special.point)) * before > 0.0 {
-                    true => "non-smooth fold",
-                    false => "persistence",
-                }
-            }
+    /// Says what becomes of the branch at an impact grazing, beyond which it goes on with `next`, if it does.
+    fn tell_impacts(
+        &self,
+        system: &System,
+        branch: &Branch,
+        side: usize,
+        special: &mut SpecialPoint,
+        next: Option<&Station>,
+    ) {
+        let count = |point: &Point| match &point.solution {
+            Solution::Cycle(cycle) => impacts(system.field, &point.parameters, cycle).len(),
+            Solution::Equilibrium(_) => 0,
         };
-        Coefficients { remark: format!("{kind}: {}", special.remark), ..Coefficients::default() }
+        let own = count(&special.point);
+        let Some(next) = next else {
+            special.remark = format!("impacts {own}; no cycle with another sequence was found beside it");
+            return;
+        };
+        let towards = if side == 1 { 1.0 } else { -1.0 };
+        let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let before = -towards * special.point.parameter_slope();
+        let kind = match (value(&next.point) - value(&special.point)) * before > 0.0 {
+            true => "non-smooth fold",
+            false => "persistence",
+        };
+        let beyond = count(&next.point);
+        let [from, to] = if side == 1 { [own, beyond] } else { [beyond, own] };
+        special.remark = format!("{kind}: impacts {from} → {to}");
+        let unstable = if side == 1 { &mut special.unstable_after } else { &mut special.unstable_before };
+        *unstable = next.point.unstable;
     }
 
     /// Returns the coefficients of the normal form of a special point.
@@ -796,7 +815,7 @@ impl Growth<'_> {
             return Coefficients { remark: self.peak(branch, special), ..Coefficients::default() };
         }
         if special.kind == Kind::ImpactGrazing {
-            return self.at_impact_grazing(system, branch, side, special);
+            return Coefficients { remark: special.remark.clone(), ..Coefficients::default() };
         }
         if let Solution::Cycle(cycle) = &special.point.solution
             && !impacts(system.field, &special.point.parameters, cycle).is_empty()

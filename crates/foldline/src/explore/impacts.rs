@@ -219,6 +219,9 @@ fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
     (flights, q)
 }
 
+/// A problem with another sequence of events, and a point of it.
+pub(super) type Beyond<'a> = (Box<dyn ZeroProblem + 'a>, Station);
+
 /// The continuation of a branch beyond an impact grazing: the problem of the new sequence of events, and a point of it.
 pub(super) fn beyond<'a>(
     system: &'a System,
@@ -226,7 +229,7 @@ pub(super) fn beyond<'a>(
     free: usize,
     at: &Point,
     side: f64,
-) -> Option<(Box<dyn ZeroProblem + 'a>, Station)> {
+) -> Option<Beyond<'a>> {
     /// Distances from the grazing, in scaled variables.
     const DISTANCES: [f64; 4] = [2e-3, 2e-4, 2e-5, 1e-2];
     let Solution::Cycle(cycle) = &at.solution else { return None };

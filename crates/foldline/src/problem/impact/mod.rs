@@ -50,6 +50,8 @@ pub struct ImpactProblem<'a> {
     /// Parameters and axes with the phase of the first event, if the field is forced.
     parameters: Vec<f64>,
     axes: Vec<Axis>,
+    /// `[k]`: sign of the change of the switch of each event.
+    signs: Vec<f64>,
     /// Phase of the last reference.
     phase: Cell<f64>,
     parked: RefCell<Option<CycleProblem<'static>>>,
@@ -80,9 +82,10 @@ impl<'a> ImpactProblem<'a> {
         }
         axes.extend(setting.axes.iter().cloned());
         let segments = Segments::new(field, flights.events.clone(), forcing_periods);
+        let signs = flights.signs(field, &setting.parameters, degree, forcing_periods);
         let phase = Cell::new(flights.phase);
         let parked = RefCell::new(None);
-        let problem = ImpactProblem { setting, segments, degree, scales, parameters, axes, phase, parked };
+        let problem = ImpactProblem { setting, segments, degree, scales, parameters, axes, signs, phase, parked };
         problem.with(|inner| inner.set_mesh(&flights.mesh));
         problem
     }
@@ -195,7 +198,9 @@ impl<'a> ImpactProblem<'a> {
         let surface = switches - field.event_count() + event;
         let gradient = &hx[surface * n..(surface + 1) * n];
         let [f, g] = [before, after].map(|x| self.rates(parameters, x, times));
-        let speed = dot(gradient, &f) + ht[surface];
+        // Beyond an impact grazing, where there is no motion, the multipliers come back from infinity with the same sign, so
+        // that nothing seems to change there.
+        let speed = self.signs[i] * (dot(gradient, &f) + ht[surface]).abs();
         let entry = |a: usize, b: usize| {
             let jump = g[a] - dot(&rx[a * n..(a + 1) * n], &f) - rt[a];
             rx[a * n + b] + jump * gradient[b] / speed

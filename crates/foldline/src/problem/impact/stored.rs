@@ -229,6 +229,23 @@ impl Flights {
         (0..starts.len()).min_by(|a, b| starts[*a].total_cmp(&starts[*b])).unwrap_or(0)
     }
 
+    /// Sign of the change of its switch at the end of each flight: that of the event or, if that is both, the opposite of
+    /// the switch during the flight.
+    pub fn signs(&self, field: &dyn VectorField, parameters: &[f64], degree: usize, forcing_periods: u32) -> Vec<f64> {
+        let (n, intervals) = (field.dim(), self.mesh.len() - 1);
+        let (mut begin, mut signs) = (self.phase, Vec::with_capacity(self.events.len()));
+        for ((last, profile), event) in self.flights.iter().zip(&self.events) {
+            let direction = field.event_direction(*event);
+            let j = intervals / 2;
+            let x = &profile[j * (degree + 1) * n..j * (degree + 1) * n + n];
+            let time = if forcing_periods > 0 { vec![begin + self.mesh[j] * last] } else { Vec::new() };
+            let inside = || -surfaces(field, parameters, x, &time)[*event].signum();
+            signs.push(if direction != 0.0 { direction } else { inside() });
+            begin += last;
+        }
+        signs
+    }
+
     /// The flights of several turns.
     pub fn turns(&self, count: usize) -> Flights {
         let flights = (0..count).flat_map(|_| self.flights.iter().cloned()).collect();
