@@ -38,7 +38,7 @@ pub fn misfits(branch: &Branch) -> Vec<String> {
     let fits = |kind: Kind, change: usize| match kind {
         Kind::Fold | Kind::PeriodDoubling => change == 1,
         Kind::Hopf | Kind::Torus => change >= 2 && change.is_multiple_of(2),
-        Kind::Mark | Kind::Peak | Kind::Grazing | Kind::Sliding => change == 0,
+        Kind::Mark | Kind::Peak | Kind::Grazing | Kind::Sliding | Kind::ImpactGrazing => change == 0,
         _ => true,
     };
     let wrong = branch.special.iter().filter(|s| !fits(s.kind, s.unstable_before.abs_diff(s.unstable_after)));

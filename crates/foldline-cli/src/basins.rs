@@ -68,7 +68,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         }
     }
     let all = || found.box_fates.iter().chain(&found.plane_fates);
-    let short = all().any(|fate| matches!(fate, Fate::Unsettled | Fate::Stuck | Fate::Left));
+    let short = all().any(|fate| matches!(fate, Fate::Unsettled | Fate::Stuck | Fate::Chatter | Fate::Left));
     Ok(if short { Outcome::Short } else { Outcome::Done })
 }
 

@@ -7,7 +7,7 @@ use crate::run::stop_on_interrupt;
 use crate::table::{Cell, Column, Style, Table, write};
 use crate::values::{measured, parameters, states, with_motions};
 use crate::verbosity::report;
-use foldline::contract::VectorField;
+use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::explore::course::{Course, Way, course};
 use foldline::model::Model;
 use foldline::simulation::Outcome as Ending;
@@ -34,6 +34,7 @@ pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
         return Err(vec![found].into());
     }
     let start = start(typed, &model)?;
+    allowed(&model, &start, &parameters)?;
     let columns = columns(typed, &model)?;
     let end = end(typed, &model, &parameters)?;
     let times = times(typed, &model, &parameters, end)?;
@@ -56,6 +57,15 @@ pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
         }
     }
     ended(&found, end, &model)
+}
+
+/// Refuses an initial state that an event does not allow.
+fn allowed(model: &Model, start: &[f64], parameters: &[f64]) -> Result<(), Failure> {
+    let parameters = Parameters::Shared(parameters);
+    let at = Batch { lanes: 1, states: start, parameters, times: &[0.0], signs: &[] };
+    let Some(name) = model.forbidden(at).and_then(|event| model.events.get(event)) else { return Ok(()) };
+    let message = format!("the initial state violates what the event `{name}` allows");
+    Err(Failure::typed(message, "start on the allowed side, with --start"))
 }
 
 /// Initial state. A state without a value starts at three quarters of its range, and this is reported; the midpoint is
@@ -234,6 +244,10 @@ fn ended(course: &Course, end: f64, model: &Model) -> Result<Outcome, Failure> {
         Ending::StepTooSmall => {
             "the step size became too small: the equations are discontinuous without a switching point, or too stiff \
              here"
+        }
+        Ending::Chatter => {
+            "chatter: its impacts follow each other ever faster and accumulate; what follows, lasting contact, is not \
+             computed"
         }
         Ending::StepLimit => "the limit on the number of steps was reached (--max-steps)",
     };

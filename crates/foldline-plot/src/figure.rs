@@ -284,6 +284,7 @@ impl Marker {
             Kind::Grazing => Marker::Right,
             Kind::BoundaryEquilibrium => Marker::Left,
             Kind::Sliding => Marker::Plus,
+            Kind::ImpactGrazing => Marker::Diamond,
             Kind::Peak => Marker::Nabla,
             Kind::Mark => Marker::Dot,
             Kind::Homoclinic | Kind::Heteroclinic => Marker::Dot,

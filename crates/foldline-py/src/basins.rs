@@ -87,7 +87,7 @@ fn number(fate: Fate) -> i64 {
         Fate::Unsettled => -1,
         Fate::Escaped => -2,
         Fate::Undefined => -3,
-        Fate::Stuck => -4,
+        Fate::Stuck | Fate::Chatter => -4,
         Fate::Left => -5,
     }
 }

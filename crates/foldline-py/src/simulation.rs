@@ -46,5 +46,6 @@ fn code(outcome: Outcome) -> &'static str {
         Outcome::Undefined => "undefined",
         Outcome::StepTooSmall => "step-too-small",
         Outcome::StepLimit => "step-limit",
+        Outcome::Chatter => "chatter",
     }
 }

@@ -13,6 +13,7 @@ const KINDS = {
   "grazing": ["cross", "#7a5cc0", "G"],
   "boundary-equilibrium": ["plus", "#7a5cc0", "BE"],
   sliding: ["cross", "#a0522d", "SL"],
+  "impact-grazing": ["diamond", "#7a5cc0", "IG"],
   "mark": ["ring", "#808890", "M"],
   "peak": ["ring", "#303840", "P"],
   "unexplained": ["down", "#c00000", "?"],

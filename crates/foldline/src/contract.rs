@@ -119,10 +119,34 @@ pub trait VectorField: Send + Sync {
         if self.forced() && !self.iterated() { f64::NAN } else { 0.0 }
     }
 
-    /// Number of switching functions: scalars at whose zeros f or one of its derivatives jumps. 0 if the field is
-    /// smooth.
+    /// Number of switching functions: scalars at whose zeros f, one of its derivatives or the state jumps. 0 if the
+    /// field is smooth.
     fn switch_count(&self) -> usize {
         0
+    }
+
+    /// Number of events, at which the state jumps. They are the last switches; f does not depend on their signs.
+    fn event_count(&self) -> usize {
+        0
+    }
+
+    /// Sign of the change of its switch at which the state jumps at an event; 0 for both.
+    fn event_direction(&self, _event: usize) -> f64 {
+        0.0
+    }
+
+    /// The state R(x, p, τ) after an event at a single point, and its derivatives, into `[R, R_x, R_p, R_τ]`: `[n]`,
+    /// `[n × n]`, `[n × q]` with q = `free.len()`, and `[n]`.
+    fn reset(&self, _event: usize, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) {}
+
+    /// The first event that does not allow one of the points; `None` if all are allowed.
+    fn forbidden(&self, _at: Batch) -> Option<usize> {
+        None
+    }
+
+    /// ∂f/∂τ `[n × lanes]` of a forced field with events; 0 for others.
+    fn slopes_in_time(&self, _at: Batch, out: &mut [f64]) {
+        out.fill(0.0);
     }
 
     /// f `[n]` at one point in twice the working precision. States `[n]`, parameters `[k]` and results are sums of two

@@ -5,8 +5,8 @@ use foldline::special::on_connections;
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown, Solution};
 use foldline::model::Model;
-use foldline::special::phases;
 use foldline::special::quantity::{Quantity, appended};
+use foldline::special::{impact, phases};
 use std::collections::HashMap;
 
 /// Largest number of coefficients of a normal form: that of a double Hopf point.
@@ -166,10 +166,11 @@ pub struct Contacts {
 }
 
 /// For every switch h of a model the number of phases per period in which h > 0 and their share of the period, and the
-/// sequence of all phases. The points need their profiles.
+/// sequence of all phases; for a model with events their number per period, the sum over them of the largest change of a
+/// state, and their order. The points need their profiles.
 pub fn contacts(diagram: &Diagram, model: &Model) -> Contacts {
-    let switches = 0..model.switch_count();
-    if switches.is_empty() {
+    let switches = 0..model.switch_count() - model.event_count();
+    if model.switch_count() == 0 {
         return Contacts::default();
     }
     let named = |switch: usize| model.switch_name(switch);
@@ -178,7 +179,13 @@ pub fn contacts(diagram: &Diagram, model: &Model) -> Contacts {
         .flat_map(|k| [format!("phases({} > 0)", named(k)), format!("share({} > 0)", named(k))])
         .map(|name| (name, Style::Number))
         .collect();
-    columns.push(("sequence".into(), Style::Word));
+    if !switches.is_empty() {
+        columns.push(("sequence".into(), Style::Word));
+    }
+    if model.event_count() > 0 {
+        columns.extend(["events", "impulse"].map(|name| (name.to_string(), Style::Number)));
+        columns.push(("order".into(), Style::Word));
+    }
     let of = |point: &Point| -> Option<Vec<Known>> {
         let Solution::Cycle(cycle) = &point.solution else { return None };
         let all = phases::phases(model, &point.parameters, cycle);
@@ -188,7 +195,13 @@ pub fn contacts(diagram: &Diagram, model: &Model) -> Contacts {
         let numbers = switches.clone().flat_map(|k| {
             [Known::Count(phases::times_positive(&all, k)), Known::Number(phases::share_positive(&all, k))]
         });
-        Some(numbers.chain([Known::Text(phases::sequence(model, &all))]).collect())
+        let text = (!switches.is_empty()).then(|| Known::Text(phases::sequence(model, &all)));
+        let mut values: Vec<Known> = numbers.chain(text).collect();
+        if model.event_count() > 0 {
+            let own = impact::sequence(model, &point.parameters, cycle);
+            values.extend([Known::Count(own.count), Known::Number(own.change), Known::Text(own.text())]);
+        }
+        Some(values)
     };
     let points = diagram.branches.iter().flat_map(|branch| branch.points.iter().map(move |point| (branch, point)));
     let cells = points.filter_map(|(branch, point)| Some(((branch.name.clone(), point.position), of(point)?)));

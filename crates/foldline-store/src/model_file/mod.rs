@@ -4,6 +4,7 @@
 //! reported with its line and column in the file. The format is described in docs/book/model-files.md.
 
 mod boundary;
+mod events;
 mod functions;
 pub(crate) mod items;
 mod mass;
@@ -22,7 +23,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 30] = [
+const ROOT_KEYS: [&str; 31] = [
     "name",
     "description",
     "source",
@@ -40,6 +41,7 @@ const ROOT_KEYS: [&str; 30] = [
     "states",
     "equations",
     "map",
+    "events",
     "mass",
     "totals",
     "outputs",
@@ -212,6 +214,7 @@ impl Reader<'_> {
             source.equations.push(Definition::new(&name, &expression));
         }
         self.mass(root, &mut source);
+        self.events(root, &mut source);
         for (name, place, value) in self.entries(root, "totals") {
             self.total(name, place, value, &mut source);
         }

@@ -224,6 +224,7 @@ fn parse(
         override_parameters(&mut walk, value, &model, &mut defaults, true);
     }
     no_motions(&mut walk, &root, &model);
+    with_events(&mut walk, &root, &model);
     let record: Vec<(String, Quantity)> = root
         .get("record")
         .map(|value| branches::quantities(&mut walk, value, "`record`", &model))
@@ -309,6 +310,47 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
                 let message = format!("`{key}` is not supported for boundary-value problems");
                 let hint = "make the quantity a condition of the model, with the second parameter under `solve`";
                 walk.report(value.span(), message, hint);
+            }
+        }
+    }
+}
+
+/// Reports what does not exist for a model with events.
+fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
+    let events = model.event_count();
+    if events == 0 {
+        return;
+    }
+    let kinks = model.switch_count() - events;
+    for (key, message, hint) in [
+        (
+            "explore",
+            "models with events are not explored",
+            "start a `[[branch]]` at a `[[seed]]`, and switch at its period doublings",
+        ),
+        (
+            "curve",
+            "curves in two parameters are not followed for models with events",
+            "repeat the branch at several values of the second parameter",
+        ),
+    ] {
+        for (span, _) in walk.tables(root, key) {
+            walk.report(span, message, hint);
+        }
+    }
+    for (span, table) in walk.tables(root, "branch") {
+        if kinks > 0 {
+            let message = format!(
+                "the model has events and switching points ({} = 0): its branches are not followed",
+                model.switch_name(0)
+            );
+            let hint = "remove the events or the switching points; simulations, sweeps and surveys have both";
+            walk.report(span, message, hint);
+        }
+        for key in ["hold", "peaks"] {
+            if let Some(value) = table.get(key) {
+                let message = format!("`{key}` is not supported for models with events");
+                walk.report(value.span(), message, format!("remove `{key}`"));
             }
         }
     }

@@ -218,7 +218,7 @@ fn add(
             Fate::Escaped => census.escaped += 1,
             // Already counted in `exits`.
             Fate::Undefined => {}
-            Fate::Stuck => census.stuck += 1,
+            Fate::Stuck | Fate::Chatter => census.stuck += 1,
             Fate::Left => census.left += 1,
         }
     }
@@ -249,6 +249,8 @@ pub enum Lost {
     Undefined(Exit),
     /// The step size became too small: f jumps, or is too stiff.
     Stuck,
+    /// Events accumulate.
+    Chatter,
 }
 
 impl Lost {
@@ -274,6 +276,7 @@ pub(super) fn settle(
         Some(Fate::Escaped) => Err(Lost::Escaped),
         Some(Fate::Undefined) => Err(watched.exits.pop().map_or(Lost::Escaped, Lost::Undefined)),
         Some(Fate::Stuck) => Err(Lost::Stuck),
+        Some(Fate::Chatter) => Err(Lost::Chatter),
         _ => Err(Lost::nothing(start)),
     }
 }
@@ -411,6 +414,7 @@ fn watch_block(
         (None, Outcome::Escaped) => Fate::Escaped,
         (None, Outcome::Undefined) => Fate::Undefined,
         (None, Outcome::StepTooSmall) => Fate::Stuck,
+        (None, Outcome::Chatter) => Fate::Chatter,
         (None, _) => Fate::Unsettled,
     });
     let fates: Vec<Fate> = fates.collect();

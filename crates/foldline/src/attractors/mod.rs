@@ -130,6 +130,8 @@ pub enum Fate {
     Undefined,
     /// The step size became too small.
     Stuck,
+    /// Its events, such as impacts, follow each other ever faster and accumulate.
+    Chatter,
     /// Abandoned early.
     Left,
 }

@@ -499,8 +499,10 @@ impl Follow<'_> {
         self.count(&mut station);
         // On non-smooth fields a parameter is no more accurate than the profile, and two meshes may agree by chance.
         let least = if self.problem.is_switched()
-            && !matches!(kind, Kind::Mark | Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium)
-        {
+            && !matches!(
+                kind,
+                Kind::Mark | Kind::Grazing | Kind::Sliding | Kind::ImpactGrazing | Kind::BoundaryEquilibrium
+            ) {
             station.point.trust.discretisation
         } else {
             0.0

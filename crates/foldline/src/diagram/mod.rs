@@ -358,6 +358,8 @@ pub enum Kind {
     Grazing,
     /// A cycle begins or ceases to slide along a switching surface of the vector field.
     Sliding,
+    /// An event of a cycle, such as an impact, loses its speed, or a cycle touches the surface of an event without speed.
+    ImpactGrazing,
     /// An equilibrium lies on a switching surface of the vector field.
     BoundaryEquilibrium,
     /// A quantity has a requested value.
@@ -387,7 +389,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 34] = [
+    pub const ALL: [Kind; 35] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -410,6 +412,7 @@ impl Kind {
         Kind::DoubleTorus,
         Kind::Grazing,
         Kind::Sliding,
+        Kind::ImpactGrazing,
         Kind::BoundaryEquilibrium,
         Kind::Mark,
         Kind::Peak,
@@ -428,7 +431,7 @@ impl Kind {
     pub fn has_codimension_two(self) -> bool {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
-            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::Peak)
+            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::ImpactGrazing | Kind::Peak)
             && !matches!(self, Kind::Homoclinic | Kind::Heteroclinic)
     }
 
@@ -475,6 +478,7 @@ impl Kind {
             Kind::DoubleTorus => "double-torus",
             Kind::Grazing => "grazing",
             Kind::Sliding => "sliding",
+            Kind::ImpactGrazing => "impact-grazing",
             Kind::BoundaryEquilibrium => "boundary-equilibrium",
             Kind::Mark => "mark",
             Kind::Peak => "peak",
@@ -507,6 +511,7 @@ impl Kind {
             Kind::Resonance13 => "1:3 resonance",
             Kind::Resonance14 => "1:4 resonance",
             Kind::DoubleTorus => "double torus",
+            Kind::ImpactGrazing => "impact grazing",
             Kind::BoundaryEquilibrium => "boundary equilibrium",
             Kind::NeutralSaddle => "neutral saddle",
             Kind::DoubleEigenvalue => "double eigenvalue",
@@ -788,6 +793,16 @@ impl fmt::Display for Ending {
             }
             Ending::Joined { at: Kind::PeriodDoubling, parameter } => {
                 write!(f, "became a cycle of half the period at {:.6}", Shown(*parameter))
+            }
+            Ending::Joined { at: Kind::ImpactGrazing, parameter } => {
+                write!(
+                    f,
+                    "ends at an impact grazing at {:.9}: beyond it the cycle has another sequence of impacts",
+                    Shown(*parameter)
+                )
+            }
+            Ending::Joined { at: Kind::BoundaryEquilibrium, parameter } => {
+                write!(f, "ends at {:.9}, where the equilibrium reaches the surface of an event", Shown(*parameter))
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),

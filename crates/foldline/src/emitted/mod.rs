@@ -53,11 +53,19 @@ pub struct Emitted {
 
 /// Reason why a model has no such source.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refused;
+pub enum Refused {
+    /// It is a map.
+    Map,
+    /// It has events.
+    Events,
+}
 
 impl fmt::Display for Refused {
     fn fmt(&self, to: &mut fmt::Formatter) -> fmt::Result {
-        write!(to, "the model is a map, which is iterated rather than integrated")
+        to.write_str(match self {
+            Refused::Map => "the model is a map, which is iterated rather than integrated",
+            Refused::Events => "the model has events, at which its state jumps; emitted source does not have them",
+        })
     }
 }
 
@@ -65,7 +73,10 @@ impl Emitted {
     /// Writes the source of a model.
     pub fn new(model: &Model, parts: Parts) -> Result<Emitted, Refused> {
         if model.iterated() {
-            return Err(Refused);
+            return Err(Refused::Map);
+        }
+        if model.event_count() > 0 {
+            return Err(Refused::Events);
         }
         let functions = functions(model);
         let states = model.dim() + usize::from(model.forced());

@@ -3,11 +3,12 @@
 use super::counted::Counted;
 use super::plan::Holds;
 use super::symmetry::{is_rotating_wave, rotation};
-use super::{System, corner};
+use super::{System, corner, impacts as beside_impacts};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::problem::impact::{ImpactProblem, stored::impacts};
 use crate::problem::map::MapProblem;
 use crate::problem::torus::TorusProblem;
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
@@ -20,7 +21,7 @@ use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
-use crate::special::{self, collapse, grazing, sliding};
+use crate::special::{self, collapse, grazing, impact, sliding};
 use std::cell::RefCell;
 
 /// The curve through a point that is to be followed.
@@ -140,6 +141,11 @@ pub fn surface<'a>(
     doubled: bool,
 ) -> Box<dyn ZeroProblem + 'a> {
     let setting = setting_of(system, axes, point);
+    if let Solution::Cycle(cycle) = &point.solution
+        && let Some(problem) = ImpactProblem::like(setting.clone(), cycle)
+    {
+        return Box::new(problem);
+    }
     match &point.solution {
         solution if system.field.iterated() => Box::new(MapProblem::like(setting, solution)),
         Solution::Equilibrium(_) if kind == Some(Kind::BranchPoint) => Box::new(EquilibriumProblem::unfolded(setting)),
@@ -182,7 +188,7 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
         reflections: system.reflections.clone(),
         periods,
         max_points,
-        kinks: system.field.switch_count(),
+        kinks: system.field.switch_count() - system.field.event_count(),
         ..usual
     }
 }
@@ -239,7 +245,7 @@ fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poi
 }
 
 /// Returns the tangent of the curve at `u`, a point close to it.
-fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
+pub(super) fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
     // Any row serves for the first tangent unless it is orthogonal to it.
     let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
     let mut last = vec![0.0; u.len()];
@@ -585,6 +591,9 @@ impl Growth<'_> {
             if branch.family == Family::Cycle {
                 marks.extend(sliding::monitors(system.field));
             }
+            if branch.held.is_none() {
+                marks.extend(impact::monitors(system.field, branch.family == Family::Cycle));
+            }
         }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none());
         let home = home.map(|point| Point { unstable: counted_at(point), ..point.clone() });
@@ -595,9 +604,8 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
-        let (free, corners) =
-            (branch.free, branch.held.is_none() && system.holds.is_none() && system.field.switch_count() > 0);
-        let free_cycles = branch.held.is_none() && !system.field.forced();
+        let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
+        let (branch_free, free_cycles) = (branch.free, branch.held.is_none() && !system.field.forced());
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -618,9 +626,10 @@ impl Growth<'_> {
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
-        let mut record = Record::at(&last, side == 1);
+        let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
+        let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -628,6 +637,14 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
+                    let plain = special.clone();
+                    if special.kind == Kind::ImpactGrazing {
+                        let found =
+                            beside_impacts::beyond(&system, self.settings, branch.free, &special.point, direction);
+                        let next = found.as_ref().map(|(_, next)| next);
+                        self.tell_impacts(&system, branch, side, &mut special, next);
+                        beyond.replace(found);
+                    }
                     self.tell_folds(&system, branch, &mut special);
                     if branch.family == Family::Arc {
                         (special.unstable_before, special.unstable_after) = (0, 0);
@@ -640,13 +657,13 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    let misfit = record.special(&special);
+                    let misfit = record.borrow_mut().special(&plain);
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
-                    let before = record.point(&point).filter(|_| recorded);
+                    let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
             };
@@ -674,6 +691,37 @@ impl Growth<'_> {
         if let Ending::Joined { at: Kind::Grazing, parameter } = ending {
             ending =
                 Ending::StepTooSmall(format!("no direction was found in which the branch continues at {parameter}"));
+        }
+        // Beyond an impact grazing the branch goes on with another sequence of events.
+        for _ in 0..CORNERS {
+            if !matches!(ending, Ending::Joined { at: Kind::ImpactGrazing, .. }) || self.observer.stopping() {
+                break;
+            }
+            let there = latest.borrow().clone();
+            let Some((mut problem, mut next)) = beyond.take() else { break };
+            let position = there.position + if side == 1 { 1 } else { -1 };
+            next.point.position = position;
+            record.replace(Record::at(&next.point, side == 1));
+            let mut walk = Follow {
+                problem: &mut *problem,
+                settings: self.settings,
+                monitors: &monitors,
+                marks: &marks,
+                collapses: &collapses,
+                limit: &|at| limits.approached(at).filter(|_| free_cycles),
+                corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
+                direction,
+                symmetric,
+                holds: false,
+                free: branch_free,
+                home: home.as_ref(),
+                homecoming: Homecoming::default(),
+                inspected: 0.0,
+            };
+            ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
+                true => Ending::Stopped,
+                false => follow(&mut walk, next, None, position.unsigned_abs() as usize, &mut sink),
+            };
         }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
@@ -740,11 +788,52 @@ impl Growth<'_> {
         }
     }
 
+    /// Says what becomes of the branch at an impact grazing, beyond which it goes on with `next`, if it does.
+    fn tell_impacts(
+        &self,
+        system: &System,
+        branch: &Branch,
+        side: usize,
+        special: &mut SpecialPoint,
+        next: Option<&Station>,
+    ) {
+        let count = |point: &Point| match &point.solution {
+            Solution::Cycle(cycle) => impacts(system.field, &point.parameters, cycle).len(),
+            Solution::Equilibrium(_) => 0,
+        };
+        let own = count(&special.point);
+        let Some(next) = next else {
+            special.remark = format!("impacts {own}; no cycle with another sequence was found beside it");
+            return;
+        };
+        let towards = if side == 1 { 1.0 } else { -1.0 };
+        let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let before = -towards * special.point.parameter_slope();
+        let kind = match (value(&next.point) - value(&special.point)) * before > 0.0 {
+            true => "non-smooth fold",
+            false => "persistence",
+        };
+        let beyond = count(&next.point);
+        let [from, to] = if side == 1 { [own, beyond] } else { [beyond, own] };
+        special.remark = format!("{kind}: impacts {from} → {to}");
+        let unstable = if side == 1 { &mut special.unstable_after } else { &mut special.unstable_before };
+        *unstable = next.point.unstable;
+    }
+
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         if special.kind == Kind::Peak {
             return Coefficients { remark: self.peak(branch, special), ..Coefficients::default() };
+        }
+        if special.kind == Kind::ImpactGrazing {
+            return Coefficients { remark: special.remark.clone(), ..Coefficients::default() };
+        }
+        if let Solution::Cycle(cycle) = &special.point.solution
+            && !impacts(system.field, &special.point.parameters, cycle).is_empty()
+            && special.kind != Kind::Mark
+        {
+            return Coefficients::none("normal forms of cycles with impacts are not computed");
         }
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {

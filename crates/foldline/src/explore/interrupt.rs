@@ -159,6 +159,26 @@ impl VectorField for Interruptible<'_> {
         if self.observer.stopping() { None } else { self.field.evaluate_precisely(states, parameters) }
     }
 
+    fn event_count(&self) -> usize {
+        self.field.event_count()
+    }
+
+    fn event_direction(&self, event: usize) -> f64 {
+        self.field.event_direction(event)
+    }
+
+    fn reset(&self, event: usize, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
+        self.field.reset(event, at, free, to);
+    }
+
+    fn forbidden(&self, at: Batch) -> Option<usize> {
+        self.field.forbidden(at)
+    }
+
+    fn slopes_in_time(&self, at: Batch, out: &mut [f64]) {
+        self.field.slopes_in_time(at, out);
+    }
+
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.field.switches(at, out);
     }

@@ -23,6 +23,7 @@ use crate::continuation::Settings;
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::contract::Examination;
 use crate::diagram::{Cost, Cycle, Mesh, Point, Solution};
+use crate::problem::impact::stored::impacts;
 use crate::problem::map;
 
 /// Numbers of turns that are tried; every other number up to 66 is a product of them. Empirical: sampling finds no
@@ -45,6 +46,9 @@ pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Op
 /// Returns one turn of a cycle that consists of a prime number of equal turns.
 fn reduced_once(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
+    if system.field.event_count() > 0 && !impacts(system.field, &point.parameters, cycle).is_empty() {
+        return None;
+    }
     if cycle.degree == 0 {
         return of_map(system, settings, point, cycle);
     }

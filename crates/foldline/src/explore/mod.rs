@@ -45,6 +45,7 @@ pub mod given;
 pub mod growth;
 mod holds;
 pub mod homotopy;
+mod impacts;
 mod interrupt;
 pub mod known;
 mod lookout;

@@ -103,6 +103,13 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
         .sum()
 }
 
+/// Component i at time t of samples that begin at time 0.
+pub(super) fn sampled(times: &[f64], states: &[f64], n: usize, i: usize, t: f64) -> f64 {
+    let count = times.len();
+    let k = times.partition_point(|g| *g <= t).clamp(1, count.max(2) - 1);
+    cubic(times, states, n, i, k, t)
+}
+
 /// Returns the solution in polynomials of another degree, as a start for Newton's method.
 pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
     if let Solution::Cycle(cycle) = &mut point.solution

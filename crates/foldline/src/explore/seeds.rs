@@ -11,6 +11,7 @@ use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
+use super::impacts;
 use super::maps;
 use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
@@ -23,6 +24,7 @@ use crate::contract::{Event, Examination, Observer, Unobserved};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
+use crate::special::impact::inadmissible;
 use std::sync::OnceLock;
 
 /// First solutions of a plan, one per seed, or the reason why there is none. Each is computed on first request.
@@ -325,6 +327,15 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
     }
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
+    if system.field.event_count() > 0 {
+        match impacts::polished(system, parameters, &settings, candidate) {
+            impacts::Found::Cycle(point) => {
+                return Some(*point).filter(|found| inadmissible(system.field, found).is_none());
+            }
+            impacts::Found::Nothing => return None,
+            impacts::Found::NoEvents => {}
+        }
+    }
     let solved = |spread: Spread| {
         let solution = match candidate {
             Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
@@ -345,7 +356,9 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
     };
     let cycle = matches!(candidate, Candidate::Cycle { .. });
     let found = solved(Spread::Arclength).or_else(|| if cycle { solved(Spread::Steps) } else { None })?;
-    Some(reduced(system, &settings, &found).unwrap_or(found))
+    let found = reduced(system, &settings, &found).unwrap_or(found);
+    // A solution that ignores an event is no motion.
+    Some(found).filter(|found| inadmissible(system.field, found).is_none())
 }
 
 /// Solves near a candidate, coarsely and on its own mesh: a candidate far from a solution is not worth a finer mesh.
@@ -408,6 +421,11 @@ fn from_state(
     {
         return Ok(point.clone());
     }
+    if system.field.event_count() > 0
+        && let Some(point) = impacts::through(system, &seed.parameters, &settings, state)
+    {
+        return Ok(point);
+    }
     let next = direct(system, &seed.parameters, plan.tolerance, state);
     if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
         let slowly = match *periods > NEVER {
@@ -466,6 +484,9 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
         Lost::Escaped => "grows without bound".to_string(),
         Lost::Undefined(_) => "leaves the region where the vector field is defined".to_string(),
         Lost::Stuck => "cannot be integrated: the step size becomes too small".to_string(),
+        Lost::Chatter => "ends in chatter: its impacts follow each other ever faster and accumulate; what follows, \
+                          lasting contact, is not computed"
+            .to_string(),
     };
     let exit = match lost {
         Lost::Undefined(exit) => Some(exit),

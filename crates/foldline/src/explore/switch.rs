@@ -11,6 +11,7 @@ use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
 use crate::problem::cycle::CycleProblem;
+use crate::problem::impact::{Flights, ImpactProblem};
 use crate::problem::map::MapProblem;
 use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, map_form, period_doubling};
@@ -168,7 +169,9 @@ fn doubled(
     }
     // The special point was located on a mesh twice as fine as that of other points. Every second node is enough for
     // the first point of the branch, unless none is found there or it has the wrong stability.
-    let coarse = leave(&coarsened(cycle), &DISTANCES[..4]).ok().filter(|found| exchanges_stability(at, free, found));
+    let whole = Flights::of(system.field, &at.point.parameters, cycle).is_some();
+    let coarse = if whole { None } else { leave(&coarsened(cycle), &DISTANCES[..4]).ok() };
+    let coarse = coarse.filter(|found| exchanges_stability(at, free, found));
     let first = coarse.map_or_else(|| leave(cycle, &DISTANCES), Ok)?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
@@ -200,6 +203,9 @@ fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle)
         let base = problem.unknowns_of(&Point { solution: twice, ..at.point.clone() });
         return Some((Box::new(problem), base, direction));
     }
+    if let Some(flights) = Flights::of(system.field, &at.point.parameters, cycle) {
+        return double_flights(system, free, at, cycle, &flights);
+    }
     let mut single = CycleProblem::like(setting(system, free, &at.point.parameters), cycle);
     let u = single.unknowns_of(&with(cycle.clone()));
     single.anchor(&u);
@@ -208,6 +214,31 @@ fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle)
     direction.extend([0.0, 0.0]);
     let mut problem = CycleProblem::like(setting(system, free, &at.point.parameters), &twice).with_equal_halves();
     let base = problem.unknowns_of(&with(twice));
+    Some((Box::new(problem), base, direction))
+}
+
+/// The same for cycles with events. Over two turns, a period doubling is a branch point.
+fn double_flights<'a>(
+    system: &'a System,
+    free: usize,
+    at: &SpecialPoint,
+    cycle: &Cycle,
+    flights: &Flights,
+) -> Option<Doubled<'a>> {
+    let own = setting(system, free, &at.point.parameters);
+    let twice = flights.turns(2);
+    let mut problem = ImpactProblem::of(own, cycle.degree, 2 * cycle.forcing_periods, &twice);
+    let base = problem.unknowns_with(&twice, &at.point.parameters);
+    problem.anchor(&base);
+    let scalars = 2 + usize::from(cycle.forcing_periods > 0);
+    let (size, row) = (at.point.tangent.len().checked_sub(scalars)?, flights.events.len() * (system.field.dim() + 1));
+    let (profile, rest) = at.point.tangent.split_at(size);
+    let mut tangent: Vec<f64> = profile.chunks_exact(row).flat_map(|own| own.iter().chain(own)).copied().collect();
+    tangent.extend_from_slice(rest);
+    if tangent.len() != base.len() {
+        return None;
+    }
+    let direction = branch_point::direction(&mut problem, &base, &tangent)?;
     Some((Box::new(problem), base, direction))
 }
 

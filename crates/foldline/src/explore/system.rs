@@ -278,7 +278,8 @@ impl<'a> System<'a> {
     pub fn find_reflections(&mut self, parameters: &[f64]) {
         let n = self.field.dim();
         self.reflections = vec![vec![false; n]];
-        if n > 10 {
+        // Events need not be symmetric.
+        if n > 10 || self.field.event_count() > 0 {
             return;
         }
         let points: Vec<Vec<f64>> = (0..5)

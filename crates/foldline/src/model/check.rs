@@ -366,6 +366,7 @@ pub(super) fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::Total(i) => &source.totals[i].name,
         Item::Condition(i) => source.boundary.as_ref().map_or("", |own| &own.conditions[i].name),
         Item::Integral(i) => source.boundary.as_ref().map_or("", |own| &own.integrals[i].name),
+        Item::Event(i) => &source.events[i].name,
         Item::Whirl | Item::Forcing | Item::Solve => "",
     }
 }

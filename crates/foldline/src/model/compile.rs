@@ -5,6 +5,7 @@ use super::boundary::{self, Conditions};
 use super::callable::Callables;
 use super::check::Check;
 use super::error::{Complaint, Field, Item, ModelError};
+use super::events;
 use super::family::Layout;
 use super::graph::{Graph, Id};
 use super::lower::Lowering;
@@ -30,6 +31,8 @@ pub(super) struct Compiled {
     pub outputs: Vec<Id>,
     /// Conditions at both ends of the interval, if there are any.
     pub conditions: Conditions,
+    /// Events.
+    pub events: Vec<events::Lowered>,
     /// States that form the complex signal.
     pub whirl: Option<[usize; 2]>,
 }
@@ -44,6 +47,7 @@ pub(super) struct Named {
 /// Parsed expressions of a source, in source order.
 struct Parsed {
     ends: boundary::Parsed,
+    events: events::Parsed,
     functions: Vec<Option<Expression>>,
     definitions: Vec<Option<Expression>>,
     beyond: Vec<Option<Expression>>,
@@ -132,6 +136,10 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
         }
     }
     let conditions = parsed.ends.lowered(&mut lowering, &states);
+    let events = match check.errors.is_empty() {
+        true => parsed.events.lowered(&mut lowering, source, states.len()),
+        false => Vec::new(),
+    };
     let Lowering { mut graph, period, found, .. } = lowering;
     for (item, field, complaint) in found {
         check.complain(item, field, complaint);
@@ -155,7 +163,7 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
         parameters: layout.expanded_parameters(&source.parameters),
         outputs: layout.expanded_outputs(&source.outputs),
     };
-    Ok((Compiled { period, graph, field, outputs, conditions, whirl }, named))
+    Ok((Compiled { period, graph, field, outputs, conditions, events, whirl }, named))
 }
 
 fn parse(check: &mut Check, layout: &Layout) -> Parsed {
@@ -210,7 +218,8 @@ fn parse(check: &mut Check, layout: &Layout) -> Parsed {
         check.forcing(forcing, &definitions, &functions);
     }
     let ends = boundary::parse(check);
-    Parsed { ends, functions, definitions, beyond, equations, outputs, forcing, mass }
+    let events = events::parse(check, &layout.expanded_states(&source.states));
+    Parsed { ends, events, functions, definitions, beyond, equations, outputs, forcing, mass }
 }
 
 /// Solves the equations coupled by a mass matrix for the rates.

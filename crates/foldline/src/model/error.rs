@@ -42,6 +42,8 @@ pub enum Item {
     Integral(usize),
     /// The parameters determined by the conditions.
     Solve,
+    /// An event.
+    Event(usize),
 }
 
 /// Field of an item.
@@ -69,6 +71,10 @@ pub enum Field {
     Before(usize),
     /// Value beyond the last element, by position in the list.
     After(usize),
+    /// Value of a state after an event, by position in the list.
+    Set(usize),
+    /// Condition on the states of an event.
+    Allowed,
 }
 
 /// Error in a model.
@@ -107,6 +113,7 @@ impl fmt::Display for ModelError {
             Item::Condition(_) => "the boundary condition",
             Item::Integral(_) => "the integral condition",
             Item::Solve => "solve",
+            Item::Event(_) => "the event",
         };
         write!(f, "{part}")?;
         if !self.name.is_empty() {

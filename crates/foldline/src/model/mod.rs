@@ -18,6 +18,7 @@ mod derive;
 mod dimensions;
 mod emit;
 mod error;
+mod events;
 mod exprel;
 mod family;
 pub mod forcing;
@@ -54,8 +55,8 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Boundary, Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, Spread,
-    State, Total,
+    Boundary, Constant, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter, Passing,
+    Repeat, Spread, State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
@@ -113,6 +114,8 @@ pub struct About {
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
     pub whirl: Option<[usize; 2]>,
+    /// Names of the events.
+    pub events: Vec<String>,
     /// Unit of time, and hence of periods; empty if not known.
     pub time: String,
     /// Name of the time, or of the independent variable of a boundary-value problem.
@@ -142,6 +145,7 @@ struct Inner {
     directional: Tapes<(usize, bool, Branch)>,
     switch_derivatives: Tapes<Vec<usize>>,
     condition_tapes: boundary::ConditionTapes,
+    event_tapes: events::EventTapes,
     output_derivatives: Tapes<Vec<usize>>,
     period_derivatives: Tapes<()>,
     /// Derivatives of the outputs and of the forcing period along a direction.
@@ -177,7 +181,7 @@ impl Deref for Model {
 impl Model {
     /// Compiles `source`, or returns all its errors.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
-        let refused = [iterated::refused(&source), boundary::refused(&source)].concat();
+        let refused = [iterated::refused(&source), boundary::refused(&source), events::refused(&source)].concat();
         if !refused.is_empty() {
             return Err(refused);
         }
@@ -188,9 +192,11 @@ impl Model {
         let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
-        let switches = Switches::new(&compiled.graph, &compiled.field);
+        let events: Vec<graph::Id> = compiled.events.iter().map(|event| event.when).collect();
+        let switches = Switches::new(&compiled.graph, &compiled.field, &events);
         let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
         let variable = source.boundary.as_ref().map_or(check::TIME.to_string(), |own| own.variable.clone());
+        let events = source.events.iter().map(|event| event.name.clone()).collect();
         let ModelSource { name, description, source, time, .. } = source;
         let (whirl, remarks) = (compiled.whirl, Vec::new());
         let outputs_of = output_list;
@@ -203,6 +209,7 @@ impl Model {
             totals,
             outputs: outputs_of,
             whirl,
+            events,
             time,
             variable,
             remarks,
@@ -227,6 +234,7 @@ impl Model {
             directional: RwLock::default(),
             switch_derivatives: RwLock::default(),
             condition_tapes: Default::default(),
+            event_tapes: Default::default(),
             output_derivatives: RwLock::default(),
             period_derivatives: RwLock::default(),
             moving: RwLock::default(),
@@ -593,11 +601,35 @@ impl VectorField for Model {
     }
 
     fn switch_name(&self, switch: usize) -> String {
+        let first = self.inner.switches.count - self.inner.compiled.events.len();
+        if let Some(name) = switch.checked_sub(first).and_then(|event| self.events.get(event)) {
+            return name.clone();
+        }
         let Switches { graph, switches, .. } = &self.inner.switches;
         let states: Vec<&str> = self.states.iter().map(|own| own.name.as_str()).collect();
         let parameters: Vec<&str> = self.parameters.iter().map(|own| own.name.as_str()).collect();
         let text = switches.get(switch).and_then(|id| show::text(graph, *id, &states, &parameters));
         text.unwrap_or_else(|| format!("switch {}", switch + 1))
+    }
+
+    fn event_count(&self) -> usize {
+        self.inner.compiled.events.len()
+    }
+
+    fn event_direction(&self, event: usize) -> f64 {
+        self.inner.compiled.events.get(event).map_or(0.0, |own| own.direction)
+    }
+
+    fn reset(&self, event: usize, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
+        self.resets(event, at, free, to);
+    }
+
+    fn forbidden(&self, at: Batch) -> Option<usize> {
+        self.first_forbidden(at)
+    }
+
+    fn slopes_in_time(&self, at: Batch, out: &mut [f64]) {
+        self.in_time(at, out);
     }
 
     fn conditions(&self) -> [usize; 2] {

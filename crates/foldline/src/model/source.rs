@@ -163,6 +163,44 @@ pub struct Boundary {
     pub solve: Vec<String>,
 }
 
+/// Direction in which an expression passes zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Passing {
+    /// From negative to positive.
+    #[default]
+    Up,
+    /// From positive to negative.
+    Down,
+    /// Either.
+    Either,
+}
+
+impl Passing {
+    /// Sign of the change; 0 for either.
+    pub fn sign(self) -> f64 {
+        match self {
+            Passing::Up => 1.0,
+            Passing::Down => -1.0,
+            Passing::Either => 0.0,
+        }
+    }
+}
+
+/// Event at which states jump, such as an impact.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Event {
+    /// Name.
+    pub name: String,
+    /// Expression at whose zero it occurs.
+    pub when: String,
+    /// Direction in which that passes zero.
+    pub direction: Passing,
+    /// New values of states, in terms of those before; other states keep their values.
+    pub set: Vec<Definition>,
+    /// Comparison that holds along every motion.
+    pub allowed: Option<String>,
+}
+
 /// Model as written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelSource {
@@ -192,6 +230,8 @@ pub struct ModelSource {
     pub equations: Vec<Definition>,
     /// Conditions at the ends of an interval; `None` unless the model is a boundary-value problem.
     pub boundary: Option<Boundary>,
+    /// Events at which states jump.
+    pub events: Vec<Event>,
     /// True for a map: the equations give the next state instead of the rate.
     pub map: bool,
     /// Entries of the matrix that multiplies the rates; rows without entries are those of the identity.

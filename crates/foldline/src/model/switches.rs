@@ -41,8 +41,8 @@ pub(super) struct Switches {
 }
 
 impl Switches {
-    /// Switches that `roots` depend on.
-    pub fn new(graph: &Graph, roots: &[Id]) -> Switches {
+    /// Switches that `roots` depend on, then those of the events, which no root depends on as such.
+    pub fn new(graph: &Graph, roots: &[Id], events: &[Id]) -> Switches {
         let mut graph = graph.clone();
         let reached = graph.reachable(roots);
         let varying = depends_on_state(&graph);
@@ -74,6 +74,7 @@ impl Switches {
                 own[i] = Some((place as u32, reversed));
             }
         }
+        switches.extend_from_slice(events);
         let values = Tape::new(&graph, &[&switches]);
         Switches { count: switches.len(), values, graph, switches, roots: roots.to_vec(), reached, own }
     }

@@ -153,6 +153,7 @@ fn not_posed(system: &System, branch: &Branch) -> Option<&'static str> {
     match branch {
         _ if system.is_open() => Some("sensitivities of boundary-value problems are not computed"),
         branch if branch.family == Family::Torus => Some("sensitivities of tori are not computed"),
+        _ if system.field.event_count() > 0 => Some("sensitivities of models with events are not computed"),
         branch if !branch.also.is_empty() => Some("sensitivities along a branch with held quantities are not computed"),
         _ => None,
     }

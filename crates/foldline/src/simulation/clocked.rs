@@ -72,6 +72,26 @@ impl VectorField for Clocked<'_> {
         self.0.switch_count()
     }
 
+    fn event_count(&self) -> usize {
+        self.0.event_count()
+    }
+
+    fn event_direction(&self, event: usize) -> f64 {
+        self.0.event_direction(event)
+    }
+
+    fn reset(&self, event: usize, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
+        let n = self.0.dim();
+        let [r, ..] = to;
+        r[n..].copy_from_slice(&at.states[n..]);
+        let [mut rx, mut rp, mut rt] = [n * n, n * free.len(), n].map(|size| vec![0.0; size]);
+        self.0.reset(event, self.inner(at), free, [&mut r[..n], &mut rx, &mut rp, &mut rt]);
+    }
+
+    fn forbidden(&self, at: Batch) -> Option<usize> {
+        self.0.forbidden(self.inner(at))
+    }
+
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.0.switches(self.inner(at), out);
     }

@@ -38,6 +38,7 @@ use crate::contract::{Parameters, VectorField, Verdict};
 use lanes::Lanes;
 pub(super) use pace::Limits;
 use stiff::Evidence;
+use switching::Flights;
 
 /// Number of trajectories integrated at a time: enough to keep vector instructions busy, few enough to stay in the
 /// cache.
@@ -71,6 +72,7 @@ struct Run {
     trajectory: usize,
     /// Successive sign changes of a switch without progress.
     stuck: usize,
+    flights: Flights,
     done: Option<Outcome>,
     stiff: Evidence,
     /// True if the lane is idle.
@@ -169,7 +171,10 @@ impl<'a> Ensemble<'a> {
                         self.pass(l, &kink, &mut again);
                     }
                 }
-                self.look_for_stiffness(&mut observe);
+                // The implicit method knows no jumps of the state.
+                if self.field.event_count() == 0 {
+                    self.look_for_stiffness(&mut observe);
+                }
                 self.replace_finished();
             }
         }
@@ -289,7 +294,7 @@ impl<'a> Ensemble<'a> {
         let size = crate::linalg::max_abs(&self.tolerance.absolute) / self.tolerance.relative;
         let bound = BOUND * (size + crate::linalg::max_abs(start));
         self.lanes.set(l, start, own, self.begin, bound);
-        Run { trajectory, stuck: 0, done: None, stiff: Evidence::default(), over: false }
+        Run { trajectory, stuck: 0, flights: Flights::default(), done: None, stiff: Evidence::default(), over: false }
     }
 
     /// Starts the first trajectories.

@@ -72,12 +72,14 @@ pub enum Outcome {
     StepTooSmall,
     /// The limit on the number of steps was reached.
     StepLimit,
+    /// Events follow each other ever faster and accumulate, as the impacts of a ball that comes to rest.
+    Chatter,
 }
 
 impl Outcome {
     /// True if the trajectory could not be continued.
     pub fn is_lost(self) -> bool {
-        matches!(self, Outcome::Escaped | Outcome::Undefined | Outcome::StepTooSmall)
+        matches!(self, Outcome::Escaped | Outcome::Undefined | Outcome::StepTooSmall | Outcome::Chatter)
     }
 }
 

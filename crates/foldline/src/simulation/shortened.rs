@@ -12,7 +12,7 @@ pub(super) struct Shortened<'a> {
     /// `[STAGES][n]` of the last step computed.
     pub(super) slopes: [Vec<f64>; STAGES],
     start: Vec<f64>,
-    parameters: Vec<f64>,
+    pub(super) parameters: Vec<f64>,
     signs: Vec<f64>,
     /// Length of the step.
     length: f64,
@@ -131,6 +131,14 @@ impl<'a> Shortened<'a> {
 
     fn at<'b>(&'b self, x: &'b [f64]) -> Batch<'b> {
         Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[], signs: &self.signs }
+    }
+
+    /// State after an event at `x`.
+    pub(super) fn after(&self, event: usize, x: &[f64]) -> Vec<f64> {
+        let n = x.len();
+        let [mut r, mut rx, mut rt] = [n, n * n, n].map(|size| vec![0.0; size]);
+        self.field.reset(event, Batch { signs: &[], ..self.at(x) }, &[], [&mut r, &mut rx, &mut [], &mut rt]);
+        r
     }
 
     /// Sets the sign of a switch from now on.

@@ -77,7 +77,9 @@ type Matched = ([Vec<Extremum>; 2], Vec<[usize; 2]>);
 /// Monitors of all switches of a field, for equilibria or for cycles; `axes` are the free parameters in the order of the
 /// unknowns.
 pub fn monitors<'a>(field: &'a dyn VectorField, cycles: bool, axes: &Axes) -> Vec<Box<dyn Monitor + 'a>> {
-    let each = (0..field.switch_count()).map(|switch| Grazing { field, switch, cycles, axes: axes.to_vec() });
+    // For the surfaces of events see [`super::impact`].
+    let kinks = field.switch_count() - field.event_count();
+    let each = (0..kinks).map(|switch| Grazing { field, switch, cycles, axes: axes.to_vec() });
     each.map(|own| Box::new(own) as Box<dyn Monitor + 'a>).collect()
 }
 

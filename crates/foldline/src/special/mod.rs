@@ -28,6 +28,7 @@ pub mod gradient;
 pub mod grazing;
 pub mod harmonics;
 pub mod hopf;
+pub mod impact;
 pub mod map_form;
 mod map_operator;
 pub mod mark;

@@ -64,7 +64,7 @@ pub struct Sliding<'a> {
 
 /// Monitors of all switches of a field.
 pub fn monitors(field: &dyn VectorField) -> Vec<Box<dyn Monitor + '_>> {
-    let each = (0..field.switch_count()).flat_map(|switch| [1, 2].map(|stride| (switch, stride)));
+    let each = (0..field.switch_count() - field.event_count()).flat_map(|switch| [1, 2].map(|stride| (switch, stride)));
     each.map(|(switch, stride)| Box::new(Sliding { field, switch, stride }) as Box<dyn Monitor + '_>).collect()
 }
 

@@ -179,12 +179,17 @@ pub fn verify(
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
         let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
-        if branch.family == Family::Torus {
+        let refused = match system.field.event_count() {
+            0 if branch.family == Family::Torus => Some("tori are not recomputed yet"),
+            0 => None,
+            _ => Some("solutions of models with events are not recomputed yet"),
+        };
+        if let Some(why) = refused {
             let undecided = |position: i64, special: Option<Kind>| Undecided {
                 branch: branch.name.clone(),
                 position,
                 special,
-                why: "tori are not recomputed yet",
+                why,
             };
             out.undecided.extend(chosen.iter().map(|i| undecided(branch.points[*i].position, None)));
             out.undecided.extend(branch.special.iter().map(|own| undecided(own.point.position, Some(own.kind))));

@@ -58,7 +58,10 @@ pub(super) struct Expression {
 impl Reader<'_> {
     /// Reads the sections of a rotor and adds its equations to the model; `None` if there are none, or after a mistake.
     pub(super) fn rotor(&mut self, root: &DeTable, source: &mut ModelSource) -> Option<Read> {
-        let section = SECTIONS.iter().find_map(|name| root.get_key_value(*name))?;
+        // `[contact.NAME]` is a wall of a plain model, `[[contact]]` a ring of a rotor.
+        let plain = |name: &str, value: &Value| name == "contact" && value.get_ref().as_table().is_some();
+        let section =
+            SECTIONS.iter().find_map(|name| root.get_key_value(*name).filter(|(_, value)| !plain(name, value)))?;
         let before = self.walk.found.len();
         let span = section.0.span();
         let Some(value) = root.get("rotor") else {

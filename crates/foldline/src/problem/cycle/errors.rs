@@ -18,7 +18,7 @@ const SPECTRUM_SAFE: f64 = 4.0;
 
 /// Largest difference between two spectra, relative to the larger of 1 and the modulus. Each multiplier, the largest
 /// first, is compared with the nearest of the other list that has not been used yet.
-fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
+pub(in crate::problem) fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     let mut own: Vec<Complex64> = spectrum.to_vec();
     own.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     let mut left = other.to_vec();

@@ -50,6 +50,7 @@ use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{all_finite, axpy, larger, same};
 use crate::stability::floquet::{self, Course, Floquet, Frames};
+pub(in crate::problem) use errors::spectrum_difference;
 use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -179,6 +180,78 @@ impl<'a> CycleProblem<'a> {
         problem.gain = if problem.is_open() { Vec::new() } else { cycle.gain.clone() };
         problem.arrange();
         problem
+    }
+
+    /// The same problem with another setting of as many states, conditions and free parameters.
+    pub(in crate::problem) fn rehoused<'b>(self, setting: Setting<'b>) -> CycleProblem<'b> {
+        let CycleProblem {
+            setting: _,
+            scheme,
+            sampling,
+            mesh,
+            n,
+            halves,
+            conditions,
+            forcing_periods,
+            gain,
+            times,
+            phase,
+            phase_offset,
+            anchored,
+            unphased,
+            scale,
+            period_scale,
+            axis_scales,
+            system,
+            length,
+            width,
+            lengths,
+            states,
+            ends,
+            f,
+            fx,
+            fp,
+            coupled,
+            trace,
+            measured,
+            room,
+            switched,
+            passages,
+        } = self;
+        CycleProblem {
+            setting,
+            scheme,
+            sampling,
+            mesh,
+            n,
+            halves,
+            conditions,
+            forcing_periods,
+            gain,
+            times,
+            phase,
+            phase_offset,
+            anchored,
+            unphased,
+            scale,
+            period_scale,
+            axis_scales,
+            system,
+            length,
+            width,
+            lengths,
+            states,
+            ends,
+            f,
+            fx,
+            fp,
+            coupled,
+            trace,
+            measured,
+            room,
+            switched,
+            passages,
+        }
     }
 
     /// The intervals in which the orbit `u` switches.
@@ -333,7 +406,7 @@ impl<'a> CycleProblem<'a> {
     }
 
     /// `[N][n × n]`: transition matrices from the left to the right end of each interval.
-    fn transitions(&self) -> Vec<f64> {
+    pub(in crate::problem) fn transitions(&self) -> Vec<f64> {
         let mut transitions = vec![0.0; self.intervals() * self.n * self.n];
         transitions.chunks_exact_mut(self.n * self.n).enumerate().for_each(|(j, own)| self.system.transition(j, own));
         transitions

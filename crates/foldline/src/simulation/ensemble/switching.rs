@@ -11,6 +11,34 @@ use crate::contract::Batch;
 /// switches change sign ever faster.
 pub(super) const STUCK: usize = 50;
 
+/// Times between the last events of a trajectory.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Flights {
+    last: Option<f64>,
+    /// The longest of those that have become ever shorter, the shortest, and their number.
+    longest: f64,
+    shortest: f64,
+    shorter: usize,
+}
+
+impl Flights {
+    /// Notes an event; true if events accumulate.
+    fn accumulate(&mut self, time: f64) -> bool {
+        /// Successive flights, each shorter than the one before, and the share of the first that the last has left.
+        const SHORTER: usize = 8;
+        const SHARE: f64 = 1e-5;
+        let Some(last) = self.last.replace(time) else { return false };
+        let flight = (time - last).abs();
+        if self.shorter > 0 && flight < self.shortest {
+            self.shorter += 1;
+        } else {
+            (self.longest, self.shorter) = (flight, 1);
+        }
+        self.shortest = flight;
+        self.shorter > SHORTER && flight < SHARE * self.longest
+    }
+}
+
 impl Ensemble<'_> {
     /// Initial signs of the switches, taken slightly later for a trajectory that starts on a zero, and their values at
     /// the start.
@@ -25,8 +53,13 @@ impl Ensemble<'_> {
         self.field.evaluate(at, &mut f);
         let moved: Vec<f64> = at.states.iter().zip(&f).map(|(x, f)| x + self.limits.sign * 1e-9 * f).collect();
         self.field.switches(Batch { states: &moved, ..at }, &mut later);
-        let sign = |(here, later): (&f64, &f64)| if *here == 0.0 { *later } else { *here }.signum();
-        (here.iter().zip(&later).map(sign).collect(), here)
+        // On the surface of an event, where a jump has led, the value is rounding.
+        let events = count - self.field.event_count() * at.lanes;
+        let sign = |(k, (here, later)): (usize, (&f64, &f64))| {
+            let on = *here == 0.0 || k >= events && here.abs() < (later - here).abs();
+            if on { *later } else { *here }.signum()
+        };
+        (here.iter().zip(&later).enumerate().map(sign).collect(), here)
     }
 
     /// Samples the switches at several points of the step that every lane tries.
@@ -87,6 +120,10 @@ impl Ensemble<'_> {
         if run.stuck > STUCK {
             run.done = Some(Outcome::StepTooSmall);
         }
+        let first = values.len() - self.field.event_count();
+        if let Some(event) = kink.switch.checked_sub(first) {
+            return self.jump(l, event, kink.switch, again);
+        }
         let sign = again.sign_beyond(&x, kink, run.stuck, self.limits.sign);
         again.set(kink.switch, sign);
         again.slope_at(&x, 0);
@@ -94,6 +131,45 @@ impl Ensemble<'_> {
         let at = kink.switch * lanes + l;
         self.lanes.signs[at] = sign;
         self.lanes.switches[at] = 0.0;
+    }
+
+    /// Continues beyond an event: in the state to which it leads, if its switch changes sign in its direction.
+    fn jump(&mut self, l: usize, event: usize, switch: usize, again: &mut Shortened) {
+        let (n, lanes, x) = (self.lanes.n, self.lanes.count, self.lanes.state(l));
+        let (change, direction) = (-self.lanes.signs[switch * lanes + l], self.field.event_direction(event));
+        if direction * change < 0.0 {
+            again.set(switch, change);
+            self.lanes.signs[switch * lanes + l] = change;
+            self.lanes.switches[switch * lanes + l] = 0.0;
+            again.slope_at(&x, 0);
+            (0..n).for_each(|i| self.lanes.slopes[0][i * lanes + l] = again.slopes[0][i]);
+            return;
+        }
+        let after = again.after(event, &x);
+        (0..n).for_each(|i| self.lanes.x[i * lanes + l] = after[i]);
+        let parameters = again.parameters.clone();
+        let at = Batch {
+            lanes: 1,
+            states: &after,
+            parameters: crate::contract::Parameters::Shared(&parameters),
+            times: &[],
+            signs: &[],
+        };
+        let (signs, values) = self.first_signs(at);
+        for (s, (sign, value)) in signs.iter().zip(&values).enumerate() {
+            again.set(s, *sign);
+            self.lanes.signs[s * lanes + l] = *sign;
+            // A value on the other side is rounding.
+            self.lanes.switches[s * lanes + l] = if value * sign > 0.0 { *value } else { 0.0 };
+        }
+        again.slope_at(&after, 0);
+        (0..n).for_each(|i| self.lanes.slopes[0][i * lanes + l] = again.slopes[0][i]);
+        let time = self.lanes.time[l];
+        if self.runs[l].flights.accumulate(time) {
+            self.runs[l].done = Some(Outcome::Chatter);
+        } else if after.iter().any(|x| !x.is_finite()) {
+            self.runs[l].done = Some(Outcome::Undefined);
+        }
     }
 
     /// Moves the end of the step tried by lane `l` to the surface along which it slides, if it does.

@@ -1,0 +1,128 @@
+//! Cycles with impacts, against closed forms and against multiple shooting with event location.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
+use foldline::explore::{self, System};
+use foldline_store::study_file::parse_study;
+
+/// Numbers of `tests/reference/exact_impact.csv`: one impact per period with d = 1, in closed form.
+const FOLD: f64 = 1.750_142_623_676_7;
+const GRAZES: f64 = 1.410_673_597_966_6;
+const TOUCHES: f64 = 0.704_493_589_686;
+
+fn oscillator(a: f64, e: f64) -> String {
+    format!(
+        "name = \"impacts\"\n[parameters]\nw = 1\nc = 0.1\nA = {a}\nd = 1\ne = {e}\n[forcing]\nfrequency = \"w\"\n\
+         [states.\"x''\"]\nequation = \"A*cos(w*t) - c*x' - x\"\nrange = [-2, 0.9]\nvelocity = {{ range = [-2, 2] }}\n\
+         [contact.stop]\nat = \"x\"\nclearance = \"d\"\nrestitution = \"e\"\n"
+    )
+}
+
+/// The overhung rotor in the frame that rotates with it, inside a rigid ring without friction.
+const ROTOR: &str = "name = \"rigid ring\"\n[parameters]\nOmega = 6\ne = 0.8\nzeta = 0.01\nepsilon = 0.353\nJ_p = 0.143\nm = 0.9\n\
+    [definitions]\nk = \"1 - (1 - J_p)*Omega^2\"\ng = \"(2 - J_p)*Omega\"\n\
+    [states]\nu = { equation = \"du\" }\nv = { equation = \"dv\" }\n\
+    du = { equation = \"m*epsilon*Omega^2 + g*dv - 2*zeta*du - k*u + 2*zeta*Omega*v\" }\n\
+    dv = { equation = \"-g*du - 2*zeta*dv - k*v - 2*zeta*Omega*u\" }\n\
+    [contact.ring]\nat = [\"u\", \"v\"]\nvelocity = [\"du\", \"dv\"]\nclearance = 1\nrestitution = \"e\"\n";
+
+#[track_caller]
+fn run(model: &str, study: &str) -> Diagram {
+    let text = format!("model = \"m\"\n{study}");
+    let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+#[track_caller]
+fn branch<'d>(diagram: &'d Diagram, name: &str) -> &'d Branch {
+    let found = diagram.branch(name).unwrap_or_else(|| panic!("{name}"));
+    assert!(found.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{name}: {:?}", found.ends);
+    assert!(found.special.iter().all(|special| special.kind != Kind::Unexplained), "{name}");
+    found
+}
+
+#[track_caller]
+fn located(branch: &Branch, kind: Kind, known: f64, within: f64) {
+    let values: Vec<f64> =
+        branch.special.iter().filter(|s| s.kind == kind).map(|s| s.point.parameters[branch.free]).collect();
+    let off = values.iter().map(|own| (own - known).abs()).fold(f64::INFINITY, f64::min);
+    assert!(off < within, "{}: {kind} {known}: {values:?}", branch.name);
+}
+
+fn start(branch: &Branch) -> &Point {
+    branch.points.iter().find(|point| point.position == 0).unwrap()
+}
+
+const SEED: &str = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n\
+    [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\n";
+
+/// The response turns at a fold, loses its impact where it grazes, and goes on without impacts.
+#[test]
+fn a_response_with_impacts_is_followed_to_its_grazings() {
+    let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.72, 2]\n"));
+    let own = branch(&diagram, "b");
+    let mut multipliers = start(own).spectrum.clone();
+    multipliers.sort_by(|a, b| a.im.total_cmp(&b.im));
+    for (found, known) in multipliers.iter().zip([-0.005_600_351_492, 0.005_600_351_492]) {
+        assert!((found.re + 0.584_295_314_342).abs() < 1e-7 && (found.im - known).abs() < 1e-7, "{multipliers:?}");
+    }
+    located(own, Kind::Fold, FOLD, 1e-9);
+    located(own, Kind::ImpactGrazing, GRAZES, 1e-9);
+    let grazing = own.special.iter().find(|s| s.kind == Kind::ImpactGrazing).unwrap();
+    assert!(grazing.remark.starts_with("non-smooth fold"), "{}", grazing.remark);
+    // Beyond, the motion is that of the linear oscillator.
+    let last = own.points.iter().max_by(|a, b| a.parameters[0].total_cmp(&b.parameters[0])).unwrap();
+    let w = last.parameters[0];
+    let linear = 1.0 / (1.0 - w * w).hypot(0.1 * w);
+    assert!((w - 2.0).abs() < 1e-12 && (last.ranges[0][1] - linear).abs() < 1e-7, "{w}: {:?}", last.ranges);
+}
+
+/// Where the stop is touched once more.
+#[test]
+fn a_second_touch_is_located() {
+    let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.69, 1.1]\nmax_points = 400\n"));
+    located(diagram.branch("b").unwrap(), Kind::ImpactGrazing, TOUCHES, 1e-9);
+}
+
+/// A doubling of cycles with one impact in two periods of the force, and the branch that leaves there.
+#[test]
+fn doublings_of_cycles_with_impacts_are_switched_at() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 2\nparameters = { w = 0.95 }\n\
+        samples = 32\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.935, 0.96]\n\
+        [branch.switch]\nperiod-doubling = 1\n";
+    let diagram = run(&oscillator(0.3, 0.7), study);
+    located(diagram.branch("b").unwrap(), Kind::PeriodDoubling, 0.942_780_505_343_07, 1e-9);
+    assert_eq!(diagram.branches.len(), 2);
+}
+
+/// Unstable cycles of an autonomous rotor, from states just after an impact: periods and multipliers.
+#[test]
+fn unstable_cycles_of_a_rotor_in_a_rigid_ring() {
+    for (e, state, period, multipliers) in [
+        (
+            0.8,
+            [-0.999_268_381_098, -0.038_245_294_323, 0.265_315_115_093, 3.013_276_381_444],
+            1.565_814_225_367,
+            [19.627_293_31, 0.930_740_05, 0.032_907_14],
+        ),
+        (
+            1.0,
+            [-0.999_919_973_814, -0.012_650_927_545, 0.474_884_200_657, 3.377_682_290_046],
+            1.674_786_099_499,
+            [25.800_191_62, 0.969_255_9, 0.037_397_67],
+        ),
+    ] {
+        let [u, v, du, dv] = state;
+        let study = format!(
+            "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = {{ u = {u}, v = {v}, du = {du}, dv = {dv} }}\n\
+             parameters = {{ e = {e} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [5.99, 6.01]\n"
+        );
+        let diagram = run(ROTOR, &study);
+        let point = start(diagram.branch("b").unwrap());
+        assert!((point.solution.period().unwrap() - period).abs() < 1e-8, "{:?}", point.solution.period());
+        for known in multipliers {
+            let off = point.spectrum.iter().map(|z| (z - known).norm()).fold(f64::INFINITY, f64::min);
+            assert!(off < 1e-6 * known.max(1.0), "{known}: {:?}", point.spectrum);
+        }
+    }
+}

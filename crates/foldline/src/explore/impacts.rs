@@ -1,0 +1,300 @@
+//! First cycles with events: from a trajectory over one period to its flights.
+//!
+//! **Idea.** A candidate for an attractor is a state and a period. Its trajectory is computed once more, from the first
+//! event to the one that is closest to a period later; the flights between are a first guess for Newton's method.
+
+use super::System;
+use super::growth::{direction, setting};
+use crate::attractors::Candidate;
+use crate::continuation::Settings;
+use crate::continuation::Station;
+use crate::continuation::corrector::{Plane, correct, parameter_row, settle};
+use crate::contract::{Examination, Verdict, ZeroProblem};
+use crate::diagram::{Cost, Point, Solution};
+use crate::problem::cycle::CycleProblem;
+use crate::problem::gauss::Scheme;
+use crate::problem::impact::stored::{Impact, after, impacts, surfaces, times_of, with_node};
+use crate::problem::impact::{Flights, ImpactProblem};
+use crate::problem::mesh;
+use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
+use crate::special::impact::{highest, inadmissible, speed};
+
+/// Relative accuracy of the trajectory.
+const INTEGRATION: f64 = 1e-9;
+/// Intervals of a first mesh, and degree of its polynomials.
+const INTERVALS: usize = 12;
+const DEGREE: usize = 4;
+/// Distance of the last event from a period after the first, relative to it.
+const NEAR: f64 = 0.05;
+/// Difference of the durations of flights, relative to the period, up to which turns are equal.
+const EQUAL: f64 = 1e-5;
+
+/// A flight: its samples, with times since its start.
+#[derive(Default)]
+struct Samples {
+    start: f64,
+    times: Vec<f64>,
+    states: Vec<f64>,
+}
+
+/// Outcome for a candidate.
+pub(super) enum Found {
+    /// Its motion has no events.
+    NoEvents,
+    /// It leads to no cycle.
+    Nothing,
+    /// The cycle.
+    Cycle(Box<Point>),
+}
+
+/// The cycle with events to which a candidate leads.
+pub(super) fn polished(system: &System, parameters: &[f64], settings: &Settings, candidate: &Candidate) -> Found {
+    let Candidate::Cycle { period, states, .. } = candidate else { return Found::NoEvents };
+    let n = system.field.dim();
+    let q = if system.field.forced() { period.round() as u32 } else { 0 };
+    let whole = if q > 0 { f64::from(q) } else { *period };
+    let flights = match flights(system, parameters, &states[..n], whole, q) {
+        Ok(Some(flights)) => flights,
+        Ok(None) => return Found::NoEvents,
+        Err(()) => return Found::Nothing,
+    };
+    let (flights, q) = one_turn(flights, q);
+    let mut problem = ImpactProblem::of(setting(system, 0, parameters), DEGREE, q, &flights);
+    let mut u = problem.unknowns_with(&flights, parameters);
+    problem.anchor(&u);
+    let plane = |u: &[f64]| Plane { row: parameter_row(u.len()), base: u.to_vec(), distance: 0.0 };
+    let coarse = Settings { tolerance: 1e-2, max_newton: 8, ..settings.clone() };
+    let first = plane(&u);
+    if correct(&mut problem, &coarse, &first, &mut u, &mut Cost::default()).is_err() {
+        return Found::Nothing;
+    }
+    problem.anchor(&u);
+    let value = u[u.len() - 1];
+    let Ok(mut found) = settle(&mut problem, settings, plane(&u), u, 1.0, &mut Cost::default()) else {
+        return Found::Nothing;
+    };
+    let last = found.u.len() - 1;
+    found.u[last] = value;
+    found.point.parameters = problem.point(&found.u, &found.tangent, Examination::default()).parameters;
+    Found::Cycle(Box::new(found.point))
+}
+
+/// The cycle close to a state just after an event, stable or not: one to which Newton's method leads from the trajectory
+/// up to a later event that returns close to the first.
+pub(super) fn through(system: &System, parameters: &[f64], settings: &Settings, state: &[f64]) -> Option<Point> {
+    /// Largest number of events of such a cycle, and distance of the return, relative to the largest states.
+    const MOST: usize = 16;
+    const CLOSE: f64 = 0.05;
+    let (n, field) = (state.len(), Clocked(system.field));
+    let absolute = system.scales.iter().chain(&[1.0]).map(|scale| INTEGRATION * scale).collect();
+    let integrator = Integrator::new(&field, parameters, Tolerance { relative: INTEGRATION, absolute })
+        .with_step_limit(system.limits.steps);
+    let (mut returns, mut last): (Vec<(f64, Vec<f64>)>, Option<Vec<f64>>) = (Vec::new(), None);
+    let (mut x, mut end) = (vec![0.0; n + 1], vec![0.0; n + 1]);
+    let from = [state, &[0.0]].concat();
+    integrator.trajectory(&from, [0.0, f64::MAX], &[], &mut |passage| {
+        let Passage::Step(step) = passage else { return Verdict::Continue };
+        step.start_into(&mut x);
+        if last.as_ref().is_some_and(|before| before[..n] != x[..n]) {
+            returns.push((step.start_time(), x[..n].to_vec()));
+        }
+        step.end_into(&mut end);
+        last = Some(end.clone());
+        if returns.len() > MOST { Verdict::Stop } else { Verdict::Continue }
+    });
+    let (first, start) = returns.first()?;
+    let size = start.iter().fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+    let near = |x: &[f64]| x.iter().zip(start).all(|(a, b)| (a - b).abs() < CLOSE * size);
+    returns[1..].iter().filter(|(_, x)| near(x)).find_map(|(time, _)| {
+        let last = time - first;
+        let period = if system.field.forced() { last.round() } else { last };
+        if period <= 0.0 || (last - period).abs() > NEAR * period {
+            return None;
+        }
+        let candidate = Candidate::Cycle { period, times: vec![0.0], states: state.to_vec() };
+        match polished(system, parameters, settings, &candidate) {
+            Found::Cycle(point) => Some(*point).filter(|found| inadmissible(system.field, found).is_none()),
+            Found::NoEvents | Found::Nothing => None,
+        }
+    })
+}
+
+/// The flights of the trajectory from a state over about one period; `None` without events, an error without an event
+/// about a period after the first.
+fn flights(system: &System, parameters: &[f64], start: &[f64], whole: f64, q: u32) -> Result<Option<Flights>, ()> {
+    let (n, field) = (start.len(), Clocked(system.field));
+    let absolute = system.scales.iter().chain(&[1.0]).map(|scale| INTEGRATION * scale).collect();
+    let tolerance = Tolerance { relative: INTEGRATION, absolute };
+    let longest = whole / 16.0;
+    let integrator =
+        Integrator::new(&field, parameters, tolerance).with_step_limit(system.limits.steps).with_longest_step(longest);
+    let from = [start, &[0.0]].concat();
+    let (mut all, mut events): (Vec<Samples>, Vec<usize>) = (vec![Samples::default()], Vec::new());
+    let mut last: Option<Vec<f64>> = None;
+    let mut x = vec![0.0; n + 1];
+    integrator.trajectory(&from, [0.0, 2.2 * whole], &[], &mut |passage| {
+        let Passage::Step(step) = passage else { return Verdict::Continue };
+        step.start_into(&mut x);
+        if let Some(before) = last.as_ref().filter(|before| before[..n] != x[..n]) {
+            let Some(event) = event_between(system, parameters, &before[..n], &x[..n], step.start_time()) else {
+                return Verdict::Stop;
+            };
+            events.push(event);
+            let first = all.get(1).map(|own: &Samples| own.start);
+            all.push(Samples { start: step.start_time(), ..Samples::default() });
+            if first.is_some_and(|first| step.start_time() > first + (1.0 + NEAR) * whole) {
+                return Verdict::Stop;
+            }
+        }
+        let Some(own) = all.last_mut() else { return Verdict::Stop };
+        if own.times.is_empty() {
+            own.times.push(0.0);
+            own.states.extend_from_slice(&x[..n]);
+        }
+        const PARTS: usize = 4;
+        for part in 1..=PARTS {
+            let theta = part as f64 / PARTS as f64;
+            step.state_into(theta, &mut x);
+            own.times.push(step.time_at(theta) - own.start);
+            own.states.extend_from_slice(&x[..n]);
+        }
+        last = Some(x.clone());
+        Verdict::Continue
+    });
+    let Some(first) = all.get(1).map(|own| own.start).filter(|first| *first < (1.0 + NEAR) * whole) else {
+        return Ok(None);
+    };
+    let off = |own: &Samples| (own.start - first - whole).abs() / whole;
+    let nearest = (2..all.len()).min_by(|a, b| off(&all[*a]).total_cmp(&off(&all[*b]))).ok_or(())?;
+    if off(&all[nearest]) > NEAR {
+        return Err(());
+    }
+    let mesh = mesh::uniform(INTERVALS);
+    let (scheme, own) = (Scheme::of(DEGREE), &all[1..nearest]);
+    let flight = |own: &Samples| {
+        let last = own.times.last().copied().unwrap_or(0.0);
+        let places =
+            mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
+        let profile =
+            places.flat_map(|s| (0..n).map(move |i| super::profile::sampled(&own.times, &own.states, n, i, s * last)));
+        (last, profile.collect())
+    };
+    let phase = if q > 0 { first } else { 0.0 };
+    let flights = own.iter().map(flight).collect();
+    Ok(Some(Flights { phase, events: events[1..nearest].to_vec(), mesh: mesh.clone(), flights }))
+}
+
+/// The event that leads from one state to the other.
+fn event_between(system: &System, parameters: &[f64], before: &[f64], reached: &[f64], time: f64) -> Option<usize> {
+    let times = if system.field.forced() { vec![time] } else { Vec::new() };
+    let h = surfaces(system.field, parameters, before, &times);
+    let off = |event: usize| {
+        let own = after(system.field, parameters, event, before, &times);
+        own.iter().zip(reached).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    (0..h.len())
+        .min_by(|a, b| (off(*a), h[*a].abs()).partial_cmp(&(off(*b), h[*b].abs())).unwrap_or(std::cmp::Ordering::Equal))
+}
+
+/// One turn, if the flights are several equal ones.
+fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
+    let count = flights.flights.len();
+    let whole: f64 = flights.flights.iter().map(|(last, _)| last).sum();
+    for turns in (2..=count).rev() {
+        if count % turns != 0 || q > 0 && !q.is_multiple_of(turns as u32) {
+            continue;
+        }
+        let own = count / turns;
+        let equal = (own..count).all(|k| {
+            flights.events[k] == flights.events[k - own]
+                && (flights.flights[k].0 - flights.flights[k - own].0).abs() < EQUAL * whole
+        });
+        if equal {
+            let mut one = flights;
+            one.events.truncate(own);
+            one.flights.truncate(own);
+            return (one, if q > 0 { q / turns as u32 } else { 0 });
+        }
+    }
+    (flights, q)
+}
+
+/// A problem with another sequence of events, and a point of it.
+pub(super) type Beyond<'a> = (Box<dyn ZeroProblem + 'a>, Station);
+
+/// The continuation of a branch beyond an impact grazing: the problem of the new sequence of events, and a point of it.
+pub(super) fn beyond<'a>(
+    system: &'a System,
+    settings: &Settings,
+    free: usize,
+    at: &Point,
+    side: f64,
+) -> Option<Beyond<'a>> {
+    /// Distances from the grazing, in scaled variables.
+    const DISTANCES: [f64; 4] = [2e-3, 2e-4, 2e-5, 1e-2];
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    let (field, parameters) = (system.field, &at.parameters);
+    let mut all = impacts(field, parameters, cycle);
+    let speeds: Vec<f64> = all.iter().map(|own| speed(field, parameters, cycle, own).abs()).collect();
+    let slowest = (0..all.len()).min_by(|a, b| speeds[*a].total_cmp(&speeds[*b]));
+    let touch = highest(field, parameters, cycle);
+    // The speed of an oscillation of that size.
+    let whole = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    let usual = touch.size * std::f64::consts::TAU / whole;
+    let vanishes = slowest.filter(|k| speeds[*k] / usual < touch.value.abs() / touch.size);
+    let own = setting(system, free, parameters);
+    let (mut problem, u): (Box<dyn ZeroProblem + 'a>, Vec<f64>) = match vanishes {
+        Some(slowest) => {
+            all.remove(slowest);
+            match Flights::between(all, cycle) {
+                Some(flights) => of_flights(own, cycle.degree, cycle.forcing_periods, &flights, parameters),
+                None => {
+                    let mut problem = CycleProblem::like(own, cycle);
+                    let u = problem.unknowns_of(at);
+                    (Box::new(problem), u)
+                }
+            }
+        }
+        None => {
+            let (cut, interval) = with_node(cycle, touch.time);
+            let before = cut.state(touch.time);
+            let after = after(field, parameters, touch.event, &before, &times_of(&cut, touch.time));
+            all.iter_mut().filter(|own| own.interval >= interval).for_each(|own| own.interval += 1);
+            all.push(Impact { interval, time: touch.time, event: touch.event, before, after });
+            all.sort_by_key(|own| own.interval);
+            let flights = Flights::between(all, &cut)?;
+            of_flights(own, cycle.degree, cycle.forcing_periods, &flights, parameters)
+        }
+    };
+    problem.anchor(&u);
+    let mesh = problem.mesh();
+    let along = direction(&mut *problem, &u).ok()?;
+    for distance in DISTANCES {
+        for sign in [1.0, -1.0] {
+            problem.set_mesh(&mesh);
+            problem.anchor(&u);
+            let row: Vec<f64> = along.iter().map(|t| sign * t).collect();
+            let guess = u.iter().zip(&row).map(|(u, t)| u + distance * t).collect();
+            let plane = Plane { row, base: u.clone(), distance };
+            let found = settle(&mut *problem, settings, plane, guess, side, &mut Cost::default());
+            if let Ok(found) = found
+                && inadmissible(field, &found.point).is_none()
+            {
+                return Some((problem, found));
+            }
+        }
+    }
+    None
+}
+
+fn of_flights<'a>(
+    setting: crate::problem::Setting<'a>,
+    degree: usize,
+    forcing_periods: u32,
+    flights: &Flights,
+    parameters: &[f64],
+) -> (Box<dyn ZeroProblem + 'a>, Vec<f64>) {
+    let problem = ImpactProblem::of(setting, degree, forcing_periods, flights);
+    let u = problem.unknowns_with(flights, parameters);
+    (Box::new(problem), u)
+}
