@@ -161,9 +161,8 @@ impl Interval {
                 (0..m).for_each(|i| coordinates[i * s + c] += e.re * own[i].re + e.im * own[i].im);
             }
         }
-        let mut forces: Vec<f64> = (0..m * r)
-            .map(|k| (0..s).map(|c| local.slopes[k * s + c] * coordinates[k / r * s + c]).sum())
-            .collect();
+        let mut forces: Vec<f64> =
+            (0..m * r).map(|k| (0..s).map(|c| local.slopes[k * s + c] * coordinates[k / r * s + c]).sum()).collect();
         lu::solve(&local.matrix, m * r, &local.pivots, &mut forces, 1);
         let integrated = self.integrated(scheme, &forces, r);
         let mut push = vec![Complex64::ZERO; m];

@@ -34,7 +34,13 @@ fn case(count: usize) -> Case {
     for i in 0..half {
         linear[i * n + half + i] = 1.0;
         for k in 0..half {
-            let entry = if i == k { 2.1 } else if i.abs_diff(k) == 1 { -1.0 } else { 0.0 };
+            let entry = if i == k {
+                2.1
+            } else if i.abs_diff(k) == 1 {
+                -1.0
+            } else {
+                0.0
+            };
             linear[(half + i) * n + k] = -entry * (1.0 + 0.02 * i as f64) * 9.0;
             linear[(half + i) * n + half + k] = -0.01 * entry + 0.05 * number(i * half + k, 0.3) / half as f64;
         }
@@ -45,9 +51,8 @@ fn case(count: usize) -> Case {
         pushed[i * r + 1] = number(i, 0.2);
     }
     // Contact during half of the intervals.
-    let slopes = (0..count * m * r * s)
-        .map(|k| if k / (m * r * s) % 4 < 2 { 0.0 } else { 2.0 * number(k, 0.9) })
-        .collect();
+    let slopes =
+        (0..count * m * r * s).map(|k| if k / (m * r * s) % 4 < 2 { 0.0 } else { 2.0 * number(k, 0.9) }).collect();
     Case {
         n,
         count,
@@ -85,9 +90,8 @@ impl Case {
     fn low(&self, closure: f64) -> LocalSystem {
         let n = self.n;
         let modes = Modes::of(&self.linear, &vec![1.0; n]).unwrap();
-        let modal = |row: usize, k: usize| -> f64 {
-            (0..n).map(|i| modes.to[row * n + i] * self.pushed[i * 2 + k]).sum()
-        };
+        let modal =
+            |row: usize, k: usize| -> f64 { (0..n).map(|i| modes.to[row * n + i] * self.pushed[i * 2 + k]).sum() };
         let pair = |at: usize, size: usize, of: &dyn Fn(usize) -> f64| {
             Complex64::new(of(at), if size == 2 { of(at + 1) } else { 0.0 })
         };
@@ -246,9 +250,8 @@ fn an_interval_that_is_given_explicitly_counts_like_any_other() {
     let [one, other] = [with(columns.clone(), low.links.clone()), with(columns, plain.links.clone())];
     let size = 12 * 5 * n + case.q;
     // Equations of the inner nodes of a given interval are those of the nodes alone.
-    let rhs: Vec<f64> = (0..size)
-        .map(|k| if (7 * 5 * n + n..8 * 5 * n).contains(&k) { 0.0 } else { number(k, 0.5) })
-        .collect();
+    let rhs: Vec<f64> =
+        (0..size).map(|k| if (7 * 5 * n + n..8 * 5 * n).contains(&k) { 0.0 } else { number(k, 0.5) }).collect();
     let [mut a, mut b] = [vec![0.0; size], vec![0.0; size]];
     one.solve(&rhs, &mut a);
     other.solve(&rhs, &mut b);

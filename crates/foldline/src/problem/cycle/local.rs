@@ -64,7 +64,8 @@ impl Structure {
                     continue;
                 }
                 varies = true;
-                let [low, high] = own.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
+                let [low, high] =
+                    own.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
                 let width = (high - low) * sizes[k] / sizes[i];
                 if width > widest {
                     (widest, typical) = (width, i * n + k);
@@ -91,7 +92,8 @@ impl Structure {
     /// Scaled variation of column k in a lane, `[n]`.
     fn variation(&self, fx: &[f64], lanes: usize, lane: usize, k: usize) -> Vec<f64> {
         let n = self.sizes.len();
-        let at = |i: usize| (fx[(i * n + k) * lanes + lane] - self.reference[i * n + k]) * self.sizes[k] / self.sizes[i];
+        let at =
+            |i: usize| (fx[(i * n + k) * lanes + lane] - self.reference[i * n + k]) * self.sizes[k] / self.sizes[i];
         (0..n).map(at).collect()
     }
 
@@ -100,7 +102,9 @@ impl Structure {
         let n = self.sizes.len();
         let mut left: Vec<Vec<f64>> = Vec::new();
         for k in &self.columns {
-            left.extend((0..lanes).map(|lane| self.variation(fx, lanes, lane, *k)).filter(|v| v.iter().any(|x| *x != 0.0)));
+            left.extend(
+                (0..lanes).map(|lane| self.variation(fx, lanes, lane, *k)).filter(|v| v.iter().any(|x| *x != 0.0)),
+            );
         }
         let norm = |v: &Vec<f64>| dot(v, v).sqrt();
         let largest = left.iter().map(norm).fold(0.0, f64::max);
@@ -191,8 +195,13 @@ impl CycleProblem<'_> {
         self.lay_phase();
         self.gather(u);
         let known = self.setting.at(&u[size + 1..]);
-        let batch =
-            Batch { lanes, states: &self.states, parameters: Parameters::Shared(&known), times: &self.times, signs: &[] };
+        let batch = Batch {
+            lanes,
+            states: &self.states,
+            parameters: Parameters::Shared(&known),
+            times: &self.times,
+            signs: &[],
+        };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         let (structure, slopes) = Structure::of(&self.fx, lanes, &self.scale)?;
         let common = structure.common()?;

@@ -38,6 +38,8 @@ mod meshes;
 mod open;
 mod phase;
 mod residual;
+#[cfg(test)]
+mod tests_local;
 
 use super::defect;
 use super::gauss::Scheme;
