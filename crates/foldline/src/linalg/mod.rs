@@ -12,6 +12,7 @@ pub mod cyclic;
 pub mod dense;
 pub mod ends;
 pub mod lane;
+pub mod local;
 pub mod lu;
 pub mod panel;
 pub mod periodic_schur;

@@ -15,6 +15,7 @@ impl CycleProblem<'_> {
     /// which is the direction of period doubling; `None` if the computation fails. The layout is that of the profile.
     pub fn antiperiodic_direction(&mut self, u: &[f64]) -> Option<Vec<f64>> {
         let row = vec![0.0; self.setting.freedom() * u.len()];
+        self.local = None;
         self.fill(u, &row).ok()?;
         let q = 1 + self.setting.freedom();
         // A unit corner block freezes the scalars, so that only the profile varies.

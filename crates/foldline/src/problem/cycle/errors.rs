@@ -86,6 +86,13 @@ pub(super) struct Measured {
     degeneracy: f64,
 }
 
+impl Measured {
+    /// The unknowns λ, after a profile of the given size.
+    pub(super) fn scalars(&self, size: usize) -> &[f64] {
+        &self.at[size + 1..]
+    }
+}
+
 impl CycleProblem<'_> {
     /// Estimated relative error on every interval. The estimate for the last point is reused: its factorisation, which
     /// must belong to the current mesh, was close enough to the point then.
@@ -176,6 +183,9 @@ impl CycleProblem<'_> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
+        if self.is_localised() {
+            return self.locally_corrected(u, &better, &known.within, switched);
+        }
         let plain = self.transitions();
         let mut transitions = [plain.clone(), plain.clone()];
         let profiles = [Profile { u, without: None }, Profile { u: &better, without: Some(&known.within) }];
@@ -293,7 +303,7 @@ impl CycleProblem<'_> {
         let mut shift = vec![0.0; u.len()];
         match self.is_open() {
             true => self.solve_defects(&rhs, &mut shift),
-            false => self.system.solve(&rhs, &mut shift),
+            false => self.solve_closed(&rhs, &mut shift),
         }
         let response = self.relative_size(&shift, u);
         let sizes: Vec<f64> = misses

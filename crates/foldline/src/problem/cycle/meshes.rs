@@ -16,6 +16,7 @@ impl CycleProblem<'_> {
     /// Resizes the workspace for the current mesh.
     pub(super) fn arrange(&mut self) {
         self.measured.replace(None);
+        self.local = None;
         self.anchored.clear();
         self.unphased = false;
         let (n, count, mesh) = (self.n, self.intervals(), &self.mesh);

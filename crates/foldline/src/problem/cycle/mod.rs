@@ -33,11 +33,14 @@
 
 mod assembly;
 mod errors;
+mod local;
 mod meshes;
 mod open;
 mod phase;
 mod residual;
 mod segment;
+#[cfg(test)]
+mod tests_local;
 
 use super::defect;
 use super::gauss::Scheme;
@@ -102,6 +105,9 @@ pub struct CycleProblem<'a> {
     /// Sizes of the unknowns λ in the inner product: 1, or 1 + |λ| of those that conditions determine.
     axis_scales: Vec<f64>,
     system: System,
+    /// The last factorisation, if local forces were made use of; below, false if they must not be.
+    local: Option<local::Localised>,
+    structured: bool,
     /// Number of places and lanes of the solver; see [`System`].
     length: usize,
     width: usize,
@@ -137,6 +143,8 @@ impl<'a> CycleProblem<'a> {
         let mut problem = CycleProblem {
             system: System::new(n, &scheme.end, 1 + setting.freedom() + unused),
             conditions,
+            local: None,
+            structured: true,
             length: 0,
             width: 1,
             lengths: Vec::new(),
@@ -400,6 +408,9 @@ impl<'a> CycleProblem<'a> {
 
     /// Multipliers from the last factorisation, which must be one at `u`.
     fn floquet(&self, u: &[f64]) -> Floquet {
+        if let Some(local) = &self.local {
+            return self.local_floquet(u, local);
+        }
         let (frames, transitions) = (self.frames(u), self.transitions());
         let course = Course { transitions: [&transitions; 2], frames: frames.as_ref() };
         floquet::one(course, &self.scale)
@@ -415,6 +426,14 @@ impl<'a> CycleProblem<'a> {
     /// Frames that split off the trivial multiplier; `None` for a forced field.
     fn frames(&self, u: &[f64]) -> Option<Frames> {
         (!self.is_forced()).then(|| Frames::along(&self.flow_at_nodes(u), self.n))
+    }
+
+    /// Solves with the last factorisation of a problem without conditions on its ends.
+    fn solve_closed(&self, rhs: &[f64], x: &mut [f64]) {
+        match &self.local {
+            Some(local) => local.system.solve(rhs, x),
+            None => self.system.solve(rhs, x),
+        }
     }
 
     fn block(&self) -> usize {
@@ -596,6 +615,10 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        self.local = self.localised(u, rows);
+        if self.local.is_some() {
+            return Ok(());
+        }
         self.fill(u, rows)?;
         self.system.eliminate(1.0)
     }
@@ -603,7 +626,7 @@ impl ZeroProblem for CycleProblem<'_> {
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
         match self.is_open() {
             true => self.solve_open(rhs, x),
-            false => self.system.solve(rhs, x),
+            false => self.solve_closed(rhs, x),
         }
     }
 
