@@ -134,7 +134,7 @@ impl<'s> Start<'s> {
     fn cycle(&self) -> Option<&Cycle> {
         match &self.point.solution {
             Solution::Cycle(cycle) => Some(cycle),
-            Solution::Equilibrium(_) => None,
+            Solution::Equilibrium(_) | Solution::Torus(_) => None,
         }
     }
 }
@@ -384,7 +384,7 @@ fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usiz
     let setting = line.setting(system, &start.point.parameters);
     let cycle = match &start.point.solution {
         Solution::Cycle(cycle) => cycle.clone(),
-        Solution::Equilibrium(_) => Cycle {
+        Solution::Equilibrium(_) | Solution::Torus(_) => Cycle {
             period: 1.0,
             forcing_periods: 1,
             mesh: vec![0.0, 1.0].into(),

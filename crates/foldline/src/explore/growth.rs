@@ -799,7 +799,7 @@ impl Growth<'_> {
     ) {
         let count = |point: &Point| match &point.solution {
             Solution::Cycle(cycle) => impacts(system.field, &point.parameters, cycle).len(),
-            Solution::Equilibrium(_) => 0,
+            Solution::Equilibrium(_) | Solution::Torus(_) => 0,
         };
         let own = count(&special.point);
         let Some(next) = next else {

@@ -97,6 +97,7 @@ pub fn inadmissible(field: &dyn VectorField, at: &Point) -> Option<String> {
     };
     let cycle = match &at.solution {
         Solution::Equilibrium(x) => return forbidden(x, &[]),
+        Solution::Torus(_) => return None,
         Solution::Cycle(cycle) => cycle,
     };
     let (n, scheme) = (cycle.dim(), Scheme::of(cycle.degree));
