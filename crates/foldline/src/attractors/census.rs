@@ -5,7 +5,6 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
 use super::watch::{ARRIVED, RADII, WINDOW, Watch};
 use super::{Attractor, Candidate, Census, Early, Enough, Exit, Fate, Limits, Polish, Sampling};
@@ -43,6 +42,9 @@ const CHECKED: usize = 64;
 const ENOUGH: usize = 100;
 /// Default limit on the number of steps of a trajectory, beyond which it counts as unsettled: a few thousand periods.
 pub(super) const STEP_LIMIT: usize = 60_000;
+/// Least limit on the number of steps of a single trajectory: some ten bursts of a few hundred stiff spikes, a few
+/// seconds of a processor.
+pub(super) const PERSISTENT: usize = 1_000_000;
 
 /// A solution and its hits.
 struct Reached {
@@ -114,6 +116,9 @@ pub(super) fn survey(
         }
     }
     census.left += sampling.samples.saturating_sub(taken * block);
+    if block == Pace::BRIEF.block && !ended && !field.ended() {
+        follow_one(&context, &starts, &mut reached, &mut census);
+    }
     // Solutions that no sample reached count only if the survey ended early and none of their type was reached.
     let kinds =
         [false, true].map(|cycle| reached.iter().any(|known| known.orbit.is_cycle() == cycle && known.hits > 0));
@@ -281,11 +286,33 @@ pub(super) fn settle(
     }
 }
 
+/// Follows the first trajectory that did not settle much further, for a search that has not found what it needs: to a
+/// burst of many spikes, which takes more steps than the limit on all samples.
+fn follow_one(context: &Context, starts: &[f64], reached: &mut Vec<Reached>, census: &mut Census) {
+    let Some(sample) = census.fates.iter().position(|fate| *fate == Fate::Unsettled) else { return };
+    let Sampling { scales, whirl, tolerance, .. } = context.sampling;
+    let n = scales.len();
+    let known = reached.iter().map(|known| known.orbit.clone()).collect();
+    let Ok(point) = patiently(context, &starts[sample * n..(sample + 1) * n], known) else { return };
+    let orbit = Orbit::new(point, scales, *whirl);
+    let watched = Watched {
+        fates: vec![Fate::Settled(0)],
+        orbits: vec![orbit],
+        exits: Vec::new(),
+        forecasts: Vec::new(),
+        ended: false,
+    };
+    census.unsettled -= 1;
+    add(watched, sample, (reached, census, false), *tolerance);
+    // The sample keeps its place among the fates.
+    census.fates.swap_remove(sample);
+}
+
 /// Finds the attractor by simulation alone, except for the last Newton steps. `known` are solutions found on the way,
 /// none of which was observed to attract this trajectory.
 fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Point, Lost> {
     let Sampling { scales, whirl, limits, .. } = context.sampling;
-    let limits = Limits { steps: limits.steps.max(PATIENT.steps), ..*limits };
+    let limits = Limits { steps: limits.steps.max(PERSISTENT), ..*limits };
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1, limits };
     let settled = settle_together(&trial, context.parameters, start, First::Accurate, limits).pop();
     let settled = settled.ok_or(Lost::nothing(start))?;

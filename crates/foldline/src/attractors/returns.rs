@@ -41,6 +41,9 @@ const REACH: f64 = 0.5;
 /// Difference, relative to the extent, below which successive turns are the same motion. A spiral that turns by nearly
 /// half a revolution per turn comes much closer to its position two turns earlier.
 const SAME: f64 = 1e-5;
+/// Half-width, relative to the extent of the motion, of the first part of a plane that is watched beside a crowded plane;
+/// it is halved while that part is crowded too.
+pub(super) const PART: f64 = 0.05;
 /// Decrease of a distance over the last returns that counts as an approach.
 const APPROACHED: f64 = 0.95;
 
@@ -51,6 +54,8 @@ pub(super) struct Returns {
     anchor: Vec<f64>,
     /// … with this normal `[n]`.
     normal: Vec<f64>,
+    /// `[n]` distances from the anchor within which a crossing counts; empty if the whole plane is used.
+    reach: Vec<f64>,
     /// Last value of the plane's equation.
     side: f64,
     total: usize,
@@ -96,7 +101,20 @@ impl Returns {
         let normal: Vec<f64> = velocity.iter().zip(scale).map(|(v, s)| v / (s * s)).collect();
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
         let normal = normal.iter().map(|v| v / length).collect();
-        Returns { anchor, normal, side: 0.0, total: 0, times: Vec::new(), states: Vec::new(), noise }
+        Returns { anchor, normal, noise, ..Returns::default() }
+    }
+
+    /// Restricts the plane to the part within these distances `[n]` of the anchor. A burst of many spikes crosses the
+    /// whole plane at every spike, and a part of it at those few that begin at nearly the same slow variables.
+    pub(super) fn within(mut self, reach: Vec<f64>) -> Returns {
+        self.reach = reach;
+        self
+    }
+
+    /// True if the trajectory has crossed so often that any period with at most [`MOST_REPEATED`] crossings has passed
+    /// twice.
+    pub(super) fn crowded(&self) -> bool {
+        self.total > 2 * MOST_REPEATED
     }
 
     /// Evaluates the equation of the plane.
@@ -116,8 +134,8 @@ impl Returns {
 
     /// Returns a parallel plane through `start`, without returns, for a trajectory that starts there.
     pub(super) fn again_from(&self, start: &[f64]) -> Returns {
-        let (anchor, normal, noise) = (start.to_vec(), self.normal.clone(), self.noise);
-        Returns { anchor, normal, noise, ..Returns::default() }
+        let (anchor, normal, reach, noise) = (start.to_vec(), self.normal.clone(), self.reach.clone(), self.noise);
+        Returns { anchor, normal, reach, noise, ..Returns::default() }
     }
 
     /// Records a crossing in the direction of the normal within the step. Returns true if there was one.
@@ -143,16 +161,25 @@ impl Returns {
                 (b, gb, ga) = (theta, g, 0.5 * ga);
             }
         }
+        let place = self.states.len();
+        self.states.resize(place + end.len(), 0.0);
+        step.state_into(theta, &mut self.states[place..]);
+        if !self.reached(&self.states[place..]) {
+            self.states.truncate(place);
+            return false;
+        }
         if self.times.len() >= KEPT {
             self.times.remove(0);
             self.states.drain(..end.len());
         }
         self.total += 1;
         self.times.push(step.time_at(theta));
-        let place = self.states.len();
-        self.states.resize(place + end.len(), 0.0);
-        step.state_into(theta, &mut self.states[place..]);
         true
+    }
+
+    /// True if a point of the plane belongs to the part that is used.
+    fn reached(&self, x: &[f64]) -> bool {
+        self.reach.iter().zip(x).zip(&self.anchor).all(|((reach, x), a)| (x - a).abs() <= *reach)
     }
 
     /// Returns the limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and
@@ -169,8 +196,7 @@ impl Returns {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
         let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
-        // m + 1 differences, and one more return for the comparison.
-        if newest < (terms + 2) * q {
+        if newest < q {
             return None;
         }
         // y(0) is the newest return.
@@ -182,6 +208,10 @@ impl Returns {
         let period = self.times[newest] - self.times[newest - q];
         if size < self.noise {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
+        }
+        // m + 1 differences, and one more return for the comparison.
+        if newest < (terms + 2) * q {
+            return None;
         }
         let gram = Gram::<M>::new(terms + 2, extent, y);
         let (gamma, earlier) = (gram.weights(0, terms + 1)?, gram.weights(1, terms + 1)?);

@@ -6,7 +6,7 @@
 //! its steps are used up.
 
 use super::Limits;
-use super::returns::{Prediction, Returns};
+use super::returns::{PART, Prediction, Returns};
 use super::settling::{First, INTEGRATION, Settled, Trial};
 use super::window::Window;
 use crate::contract::{Batch, Parameters, Verdict};
@@ -44,6 +44,15 @@ const SEEN: usize = 12;
 /// Contraction required over the predictions of a round: for few of them, and for many.
 const CONTRACTED: [f64; 2] = [0.9, 0.97];
 
+/// A plane and the record of its returns.
+struct Plane {
+    returns: Returns,
+    /// Period and last difference of the prediction at every return.
+    seen: Vec<(f64, f64)>,
+    /// `[n]` extent with which the returns are compared, if that is not the one of the last windows.
+    extent: Option<Vec<f64>>,
+}
+
 /// A trajectory and its record over several rounds.
 pub(super) struct Runner {
     first: First,
@@ -67,9 +76,12 @@ pub(super) struct Runner {
     window: Window,
     /// Smallest and largest state in each of the last windows.
     boxes: Vec<[Vec<f64>; 2]>,
-    returns: Option<Returns>,
-    /// Period and last difference of the prediction at every return.
-    seen: Vec<(f64, f64)>,
+    /// A plane, and a part of one once a plane has been crossed too often.
+    planes: [Option<Plane>; 2],
+    /// Half-width of the part, relative to the extent of the motion.
+    part: f64,
+    /// Smallest and largest state since the planes were last renewed.
+    span: Option<[Vec<f64>; 2]>,
     /// Extent of every window of the round, relative to scale and size.
     sizes: Vec<f64>,
     /// A cycle, to be confirmed by the current window: there must still be a motion.
@@ -97,8 +109,9 @@ impl Runner {
             plane_life: PLANE,
             window: Window::new(n),
             boxes: Vec::new(),
-            returns: None,
-            seen: Vec::new(),
+            planes: [None, None],
+            part: PART,
+            span: None,
             sizes: Vec::new(),
             repeats: None,
             next: None,
@@ -109,13 +122,16 @@ impl Runner {
     pub(super) fn begin(&mut self, parameters: Vec<f64>) {
         self.parameters = parameters;
         (self.round_steps, self.window) = (0, Window::new(self.start.len()));
-        self.seen.clear();
         self.boxes.clear();
         self.sizes.clear();
         (self.next, self.repeats) = (None, None);
-        // The plane of the previous round is shifted to the new start.
-        self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
-        (self.plane_life, self.plane_ends) = (PLANE, if self.returns.is_some() { PLANE } else { 0 });
+        // The planes of the previous round are shifted to the new start.
+        for plane in self.planes.iter_mut().flatten() {
+            *plane =
+                Plane { returns: plane.returns.again_from(&self.start), seen: Vec::new(), extent: plane.extent.take() };
+        }
+        self.span = None;
+        (self.plane_life, self.plane_ends) = (PLANE, if self.planes[0].is_some() { PLANE } else { 0 });
     }
 
     pub(super) fn observe(&mut self, step: &Step, trial: &Trial) -> Verdict {
@@ -124,8 +140,13 @@ impl Runner {
         self.steps += 1;
         self.round_steps += 1;
         self.window.add(&x, step);
-        if self.returns.as_mut().is_some_and(|returns| returns.follow(step, &x)) {
-            self.at_return(step);
+        for place in 0..self.planes.len() {
+            if let Some(mut plane) = self.planes[place].take() {
+                if plane.returns.follow(step, &x) {
+                    self.at_return(&mut plane, step);
+                }
+                self.planes[place] = Some(plane);
+            }
         }
         if self.round_steps.is_multiple_of(WINDOW) && self.found.is_none() && self.next.is_none() {
             self.close_window(step, &x, trial);
@@ -141,36 +162,37 @@ impl Runner {
         self.first == First::Rough && self.steps == self.round_steps
     }
 
-    /// Evaluates the returns so far.
-    fn at_return(&mut self, step: &Step) {
-        let Some(returns) = &self.returns else { return };
+    /// Evaluates the returns to a plane so far.
+    fn at_return(&mut self, plane: &mut Plane, step: &Step) {
+        let Plane { returns, seen, extent } = plane;
+        let extent = extent.as_ref().unwrap_or(&self.extent);
         // The longer a round lasts, the less a single return adds.
         if returns.total() > 200 && !returns.total().is_multiple_of(returns.total() / 100) {
             return;
         }
-        let Some(prediction) = returns.closest(&self.extent) else { return };
+        let Some(prediction) = returns.closest(extent) else { return };
         let Prediction { state, period, size, doubt, .. } = prediction;
         // A different number of crossings per period starts a new record.
-        if self.seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
-            self.seen.clear();
+        if seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
+            seen.clear();
         }
-        self.seen.push((period, size));
+        seen.push((period, size));
         let Some((_, last)) = returns.last() else { return };
-        let latest = |count: usize| self.seen.iter().rev().take(count).fold(0.0, |m: f64, (_, size)| m.max(*size));
-        let few = self.seen.len() < SEEN;
+        let latest = |count: usize| seen.iter().rev().take(count).fold(0.0, |m: f64, (_, size)| m.max(*size));
+        let few = seen.len() < SEEN;
         // Differences that no longer decrease, close to the accuracy of the integration, count as settled too.
-        let settled = (self.seen.len() >= 4 && latest(4) <= SETTLED)
-            || (self.seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(&self.seen));
+        let settled = (seen.len() >= 4 && latest(4) <= SETTLED)
+            || (seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(seen));
         if settled && self.moves {
             self.repeats = Some(Settled {
                 motion: Motion::Cycle,
                 state: last.to_vec(),
                 period,
-                extent: self.extent.clone(),
+                extent: extent.clone(),
                 time: self.time + step.end_time(),
                 error: latest(4),
             });
-        } else if !few && self.moves && self.repeats.is_none() && self.jumps < JUMPS && contracts(&self.seen) {
+        } else if !few && self.moves && self.repeats.is_none() && self.jumps < JUMPS && contracts(seen) {
             self.jumps += 1;
             let share = (5.0 * doubt / size).clamp(1e-3, 0.1);
             self.next = Some(state.iter().zip(last).map(|(limit, y)| limit + share * (y - limit)).collect());
@@ -205,12 +227,32 @@ impl Runner {
         }
         // The first windows of the first round are transient; a plane through them may not intersect the motion.
         if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
-            let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
-            self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent, INTEGRATION[0]));
-            self.seen.clear();
-            self.plane_ends = self.round_steps + self.plane_life;
-            self.plane_life *= 2;
+            self.renew_planes(step, x, trial);
         }
+    }
+
+    /// Starts a new plane at the end of a step, and a part of one if the plane is crossed so often that no period shows.
+    fn renew_planes(&mut self, step: &Step, x: &[f64], trial: &Trial) {
+        let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
+        let across = |extent: &[f64]| Returns::across(x.to_vec(), &velocity, extent, INTEGRATION[0]);
+        let [whole, part] = &mut self.planes;
+        let crowded = |plane: &Option<Plane>| plane.as_ref().is_some_and(|plane| plane.returns.crowded());
+        if crowded(part) {
+            self.part *= 0.5;
+        }
+        // A part that the motion has returned to is kept.
+        let another = part.as_ref().is_some_and(|part| part.returns.crowded() || part.returns.total() < 2);
+        if let Some([low, high]) = self.span.take()
+            && (another || part.is_none() && crowded(whole))
+        {
+            let own = |i: usize| (high[i] - low[i]).max(1e-6 * trial.scales[i]);
+            let span: Vec<f64> = (0..x.len()).map(own).collect();
+            let reach = span.iter().map(|own| self.part * own).collect();
+            *part = Some(Plane { returns: across(&span).within(reach), seen: Vec::new(), extent: Some(span) });
+        }
+        *whole = Some(Plane { returns: across(&self.extent), seen: Vec::new(), extent: None });
+        self.plane_ends = self.round_steps + self.plane_life;
+        self.plane_life *= 2;
     }
 
     /// Updates the extent over the last windows; a cycle may take longer than one.
@@ -219,6 +261,10 @@ impl Runner {
             self.boxes.remove(0);
         }
         self.boxes.push([window.low.clone(), window.high.clone()]);
+        let span = self.span.get_or_insert_with(|| [window.low.clone(), window.high.clone()]);
+        for i in 0..window.low.len() {
+            (span[0][i], span[1][i]) = (span[0][i].min(window.low[i]), span[1][i].max(window.high[i]));
+        }
         let span = |i: usize| {
             let low = self.boxes.iter().map(|[low, _]| low[i]).fold(f64::MAX, f64::min);
             self.boxes.iter().map(|[_, high]| high[i]).fold(f64::MIN, f64::max) - low
@@ -260,12 +306,15 @@ impl Runner {
 
     /// Returns a cycle that repeats itself less accurately than required, for use when no steps are left.
     fn nearly(&self) -> Option<Settled> {
-        let (_, state) = self.returns.as_ref()?.last()?;
-        let (period, _) = *self.seen.last()?;
-        let error = self.seen.iter().rev().take(2 * SEEN).fold(0.0, |m: f64, (_, size)| m.max(*size));
-        let repeats = self.moves && self.seen.len() >= 2 * SEEN && error <= NEARLY;
-        let (state, extent, time) = (state.to_vec(), self.extent.clone(), self.time);
-        repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
+        let of = |plane: &Plane| {
+            let (_, state) = plane.returns.last()?;
+            let (period, _) = *plane.seen.last()?;
+            let error = plane.seen.iter().rev().take(2 * SEEN).fold(0.0, |m: f64, (_, size)| m.max(*size));
+            let repeats = self.moves && plane.seen.len() >= 2 * SEEN && error <= NEARLY;
+            let (state, extent, time) = (state.to_vec(), self.extent.clone(), self.time);
+            repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
+        };
+        self.planes.iter().flatten().find_map(of)
     }
 
     /// Ends the round.

@@ -7,7 +7,7 @@
 use super::Candidate;
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::returns::{Prediction, Returns};
+use super::returns::{PART, Prediction, Returns};
 use crate::contract::Verdict;
 use crate::diagram::Solution;
 use crate::simulation::Step;
@@ -54,13 +54,26 @@ pub(super) struct Watch {
     extent: Option<Vec<f64>>,
     /// Largest scaled extent at which the next equilibrium is tried.
     try_equilibrium_below: f64,
-    returns: Returns,
+    /// A plane, and a part of one once a plane has been crossed too often.
+    sections: [Section; 2],
+    /// Extent since the sections were last renewed.
+    span: Window,
     section_ends: usize,
     section_life: usize,
+    /// Half-width of the part, relative to the extent of the motion.
+    part: f64,
+    approach: Approach,
+}
+
+/// A section, and when its returns are evaluated next.
+#[derive(Clone, Debug, Default)]
+struct Section {
+    returns: Returns,
+    /// `[n]` extent of the motion, with which its returns are compared; empty before the section is used.
+    extent: Vec<f64>,
     next_attempt: usize,
     /// A limit to be followed if it is still predicted at the next attempt.
     expected: Option<Prediction>,
-    approach: Approach,
 }
 
 impl Watch {
@@ -74,11 +87,11 @@ impl Watch {
             window: Window::new(n),
             extent: None,
             try_equilibrium_below: f64::INFINITY,
-            returns: Returns::default(),
+            sections: Default::default(),
+            span: Window::new(n),
             section_ends: 0,
             section_life: FIRST_SECTION,
-            next_attempt: 0,
-            expected: None,
+            part: PART,
             approach: Approach::default(),
         }
     }
@@ -95,8 +108,13 @@ impl Watch {
         if self.steps.is_multiple_of(PULSE) {
             self.settled = self.approach.measure(&x, known);
         }
-        if self.extent.is_some() && self.settled.is_none() && self.returns.follow(step, &x) {
-            self.try_cycle(known, context);
+        for place in 0..self.sections.len() {
+            let section = &mut self.sections[place];
+            if !section.extent.is_empty() && self.settled.is_none() && section.returns.follow(step, &x) {
+                let mut section = std::mem::take(section);
+                self.try_cycle(&mut section, known, context);
+                self.sections[place] = section;
+            }
         }
         if self.steps.is_multiple_of(WINDOW) && self.settled.is_none() {
             self.close_window(step, &x, known, context);
@@ -128,7 +146,7 @@ impl Watch {
     fn close_window(&mut self, step: &Step, x: &[f64], known: &mut Vec<Orbit>, context: &Context) {
         let scales = &context.sampling.scales;
         let window = std::mem::replace(&mut self.window, Window::new(x.len()));
-        let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
+        let extent = window.extent();
         let size = (0..x.len()).fold(0.0, |m: f64, i| m.max(extent[i] / scales[i]));
         // The first window is transient.
         if self.extent.is_none() {
@@ -140,16 +158,37 @@ impl Watch {
             self.try_equilibrium(candidate, &extent, known, context);
         }
         // A component that does not move is measured against a small fraction of its scale.
-        self.extent = Some((0..x.len()).map(|i| extent[i].max(1e-6 * scales[i])).collect());
-        if self.steps >= self.section_ends
-            && let Some(extent) = &self.extent
-        {
-            let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
-            self.returns = Returns::across(x.to_vec(), &velocity, extent, context.accuracy);
-            self.section_ends = self.steps + self.section_life;
-            self.section_life *= 2;
-            (self.next_attempt, self.expected) = (0, None);
+        let floored =
+            |extent: Vec<f64>| extent.iter().zip(scales).map(|(own, s)| own.max(1e-6 * s)).collect::<Vec<f64>>();
+        let extent = floored(extent);
+        self.span.include(&window);
+        if self.steps >= self.section_ends {
+            let span = std::mem::replace(&mut self.span, Window::new(x.len()));
+            self.renew_sections(step, x, (&extent, &floored(span.extent())), context.accuracy);
         }
+        self.sections[0].extent.clone_from(&extent);
+        self.extent = Some(extent);
+    }
+
+    /// Starts a new section at the end of a step, across the motion there, and a part of one if the plane is crossed so
+    /// often that no period shows. `extent` is that of the last window, `span` that of the life of the last section.
+    fn renew_sections(&mut self, step: &Step, x: &[f64], (extent, span): (&[f64], &[f64]), accuracy: f64) {
+        let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
+        let across = |extent: &[f64]| Returns::across(x.to_vec(), &velocity, extent, accuracy);
+        let [whole, part] = &mut self.sections;
+        if part.returns.crowded() {
+            self.part *= 0.5;
+        } else if whole.returns.crowded() && part.extent.is_empty() {
+            part.extent = span.to_vec();
+        }
+        // A part that the motion has returned to is kept.
+        if !part.extent.is_empty() && (part.returns.crowded() || part.returns.total() < 2) {
+            let reach = span.iter().map(|own| self.part * own).collect();
+            *part = Section { returns: across(span).within(reach), extent: span.to_vec(), ..Section::default() };
+        }
+        *whole = Section { returns: across(extent), extent: extent.to_vec(), ..Section::default() };
+        self.section_ends = self.steps + self.section_life;
+        self.section_life *= 2;
     }
 
     /// Returns the mean of a window (suits a spiral) or its last state (suits a node), whichever has the smaller f.
@@ -178,69 +217,72 @@ impl Watch {
     }
 
     /// Looks for a limit of the returns: at every return at first, then less and less often while none is found.
-    fn try_cycle(&mut self, known: &mut Vec<Orbit>, context: &Context) {
-        if self.returns.total() < self.next_attempt {
+    fn try_cycle(&mut self, section: &mut Section, known: &mut Vec<Orbit>, context: &Context) {
+        let total = section.returns.total();
+        if total < section.next_attempt {
             return;
         }
-        let Some(extent) = self.extent.clone() else { return };
+        let extent = section.extent.clone();
         // Far from every known solution and not nearly recurrent: nothing below can succeed.
         let near = |last: &[f64]| known.iter().any(|k| k.distance(last) <= NEIGHBOURHOOD);
-        if !self.returns.comes_back(&extent) && !self.returns.last().is_some_and(|(_, last)| near(last)) {
-            self.next_attempt = self.returns.total() + 2;
+        if !section.returns.comes_back(&extent) && !section.returns.last().is_some_and(|(_, last)| near(last)) {
+            section.next_attempt = total + 2;
             return;
         }
-        for prediction in self.returns.predictions(2, &extent) {
-            self.settled = self.predicted(&prediction.state, known);
+        for prediction in section.returns.predictions(2, &extent) {
+            self.settled = predicted(&section.returns, &prediction.state, known);
             if self.settled.is_some() {
                 return;
             }
             if known.iter().any(|k| k.distance(&prediction.state) <= FAITHFUL) {
                 // The limit may lie on that solution, but the trajectory is not close enough to be sure.
-                self.next_attempt = self.returns.total() + 1;
+                section.next_attempt = total + 1;
                 return;
             }
             // The fewest crossings come first: while their limit is in doubt, one over more crossings is no better.
             if !prediction.worthwhile() {
-                self.next_attempt = self.returns.total() + 2;
+                section.next_attempt = total + 2;
                 return;
             }
-            if !self.lasts(&prediction, &extent) {
+            if !section.lasts(&prediction) {
                 return;
             }
-            self.next_attempt = self.returns.total() + self.returns.total() / 2;
-            let Some(candidate) = context.follow(&self.returns, &prediction, &extent) else { continue };
+            section.next_attempt = total + total / 2;
+            let Some(candidate) = context.follow(&section.returns, &prediction, &extent) else { continue };
             if let Some(orbit) = context.polished(&candidate)
                 && orbit.distance(&prediction.state) <= FAITHFUL
             {
                 known.push(orbit);
-                self.settled = self.predicted(&prediction.state, known);
+                self.settled = predicted(&section.returns, &prediction.state, known);
                 return;
             }
         }
     }
+}
 
+impl Section {
     /// True if the limit is the one predicted some returns ago. As a motion of several frequencies decays, the limit of
     /// each few returns is steady and yet drifts, which this check detects without integrating from the limit.
-    fn lasts(&mut self, prediction: &Prediction, extent: &[f64]) -> bool {
-        let lasts = self.expected.take().is_some_and(|expected| expected.agrees(prediction, extent));
+    fn lasts(&mut self, prediction: &Prediction) -> bool {
+        let lasts = self.expected.take().is_some_and(|expected| expected.agrees(prediction, &self.extent));
         if !lasts {
             self.next_attempt = self.returns.total() + PATIENCE.max(2 * prediction.crossings);
             self.expected = Some(prediction.clone());
         }
         lasts
     }
+}
 
-    /// Returns the known solution on which a predicted limit lies and which the trajectory has been approaching. (The
-    /// limit alone does not suffice: the mean over several turns that never become equal is also a steady limit.)
-    fn predicted(&self, limit: &[f64], known: &[Orbit]) -> Option<usize> {
-        let (_, last) = self.returns.last()?;
-        known.iter().position(|orbit| {
-            let here = orbit.distance(last);
-            here <= NEIGHBOURHOOD
-                && orbit.distance(limit) <= HIT * here + ARRIVED
-                && self.returns.approach(|state| orbit.distance(state))
-        })
-    }
+/// Returns the known solution on which a predicted limit lies and which the trajectory has been approaching. (The limit
+/// alone does not suffice: the mean over several turns that never become equal is also a steady limit.)
+fn predicted(returns: &Returns, limit: &[f64], known: &[Orbit]) -> Option<usize> {
+    let (_, last) = returns.last()?;
+    known.iter().position(|orbit| {
+        let here = orbit.distance(last);
+        here <= NEIGHBOURHOOD
+            && orbit.distance(limit) <= HIT * here + ARRIVED
+            && returns.approach(|state| orbit.distance(state))
+    })
 }
 
 /// Extent and time integral of the state over some steps.
@@ -255,6 +297,19 @@ struct Window {
 impl Window {
     fn new(n: usize) -> Window {
         Window { low: vec![f64::MAX; n], high: vec![f64::MIN; n], integral: vec![0.0; n], time: 0.0 }
+    }
+
+    /// Returns the extent `[n]`.
+    fn extent(&self) -> Vec<f64> {
+        self.low.iter().zip(&self.high).map(|(low, high)| high - low).collect()
+    }
+
+    /// Extends it by another window; the integral is left alone.
+    fn include(&mut self, other: &Window) {
+        for i in 0..self.low.len() {
+            self.low[i] = self.low[i].min(other.low[i]);
+            self.high[i] = self.high[i].max(other.high[i]);
+        }
     }
 
     fn add(&mut self, x: &[f64], duration: f64) {

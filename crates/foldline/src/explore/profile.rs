@@ -34,7 +34,7 @@ pub(super) fn first_profile(
     let n = scales.len();
     // A cycle of many turns needs more intervals.
     let intervals = match spread {
-        Spread::Arclength => (times.len() / 12).clamp(60, 1200),
+        Spread::Arclength => (times.len() / 12).clamp(60, LARGEST / 2),
         Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
     };
     let scheme = Scheme::new(4);

@@ -12,7 +12,7 @@ use crate::diagram::{Cycle, Mesh};
 use crate::linalg::lane::{Eight, Lane as _};
 
 /// Largest permitted number of intervals.
-pub const LARGEST: usize = 4000;
+pub const LARGEST: usize = 16_000;
 const SMALLEST: usize = 6;
 /// Ratio of the lengths of neighbouring intervals below which the shorter one is a sliver. Empirical: far below the
 /// grading of meshes that resolve a layer, so that they stay as they are.
