@@ -23,6 +23,8 @@ use crate::problem::gauss::Scheme;
 const SHARPER: f64 = 0.2;
 /// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
 const MARGIN: f64 = 0.02;
+/// The same where the ends are so close to the equilibria that rounding would matter next.
+const ENOUGH: f64 = 0.5;
 /// Number of times that an orbit is lengthened. The error is at least quartered each time.
 const LENGTHENINGS: usize = 14;
 /// Smallest distance from the equilibria, in units of the sizes of the states, at which rounding does not matter yet.
@@ -435,10 +437,11 @@ fn settled<'s>(
         start.point = point;
         let sizes = start.field.sizes(&start.point.parameters);
         let goal = MARGIN * tolerance;
-        if error <= goal {
+        let at_limit = sizes.iter().all(|size| *size < LEAST);
+        if error <= goal || at_limit && error <= ENOUGH * tolerance {
             return Ok(start);
         }
-        if sizes.iter().all(|size| *size < LEAST) || error.is_nan() {
+        if at_limit || error.is_nan() {
             return Err(format!(
                 "the orbit cannot be lengthened until the error of its truncation, {error:.1e}, is below {goal:.1e}\n\
                  likely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where the \
