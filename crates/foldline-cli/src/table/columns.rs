@@ -1,10 +1,10 @@
 //! Columns of the tables.
 
 use super::{Cell, Column, Style, Table};
-use foldline::special::on_connections;
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown, Solution};
 use foldline::model::Model;
+use foldline::special::on_connections;
 use foldline::special::phases;
 use foldline::special::quantity::{Quantity, appended};
 use std::collections::HashMap;

@@ -177,10 +177,8 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
         _ => None,
     };
     let ends = [(parent.points.first(), 0), (parent.points.last(), 1)];
-    let mut fitting: Vec<(&Point, Option<Connection>)> = ends
-        .into_iter()
-        .filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?)))
-        .collect();
+    let mut fitting: Vec<(&Point, Option<Connection>)> =
+        ends.into_iter().filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?))).collect();
     let near = curve.near.unwrap_or(f64::NAN);
     fitting.sort_by(|a, b| (value(a.0) - near).abs().total_cmp(&(value(b.0) - near).abs()));
     let Some((point, connection)) = fitting.last().filter(|_| curve.near.is_none()).or(fitting.first()) else {
@@ -293,7 +291,10 @@ fn cut<'s>(
     let counts = [count, other.as_ref().map_or(count, |(_, x)| unstable(system, x, &point.parameters))];
     let [Some(count), Some(count_there)] = counts else {
         let state: Vec<String> = places.iter().map(|x| format!("{:.6}", Shown(*x))).collect();
-        return Err(format!("an equilibrium next to the slowest points of the last cycle is not a saddle ({})", state.join(", ")));
+        return Err(format!(
+            "an equilibrium next to the slowest points of the last cycle is not a saddle ({})",
+            state.join(", ")
+        ));
     };
     if count != count_there {
         return Err(format!(
