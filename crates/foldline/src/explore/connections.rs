@@ -23,7 +23,8 @@ use crate::problem::gauss::Scheme;
 const SHARPER: f64 = 0.2;
 /// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
 const MARGIN: f64 = 0.02;
-/// The same where the ends are so close to the equilibria that rounding would matter next.
+/// Largest estimated error of the truncation, in tolerances, of an orbit whose ends are so close to the equilibria that rounding
+/// would matter next.
 const ENOUGH: f64 = 0.5;
 /// Number of times that an orbit is lengthened. The error is at least quartered each time.
 const LENGTHENINGS: usize = 14;
