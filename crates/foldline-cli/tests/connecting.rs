@@ -123,7 +123,12 @@ fn homoclinic_orbits_of_other_models_have_known_places() {
         ),
         (
             "duffing-van-der-pol",
-            study("state = { x = 1, v = 0 }\nparameters = { nu = 0.7 }", ["nu", "[0.5, 1.5]"], ["eps", "[0.05, 0.6]"], "0.1, 0.5"),
+            study(
+                "state = { x = 1, v = 0 }\nparameters = { nu = 0.7 }",
+                ["nu", "[0.5, 1.5]"],
+                ["eps", "[0.05, 0.6]"],
+                "0.1, 0.5",
+            ),
             2,
         ),
     ];

@@ -1,12 +1,11 @@
 //! Columns of the tables.
 
 use super::{Cell, Column, Style, Table};
-use foldline::special::on_connections;
 use foldline::contract::VectorField;
 use foldline::diagram::{Branch, Cost, Diagram, Family, Origin, Point, Shown, Solution};
 use foldline::model::Model;
 use foldline::special::quantity::{Quantity, appended};
-use foldline::special::{impact, phases};
+use foldline::special::{impact, on_connections, phases};
 use std::collections::HashMap;
 
 /// Largest number of coefficients of a normal form: that of a double Hopf point.

@@ -23,6 +23,9 @@ use crate::problem::gauss::Scheme;
 const SHARPER: f64 = 0.2;
 /// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
 const MARGIN: f64 = 0.02;
+/// Largest estimated error of the truncation, in tolerances, of an orbit whose ends are so close to the equilibria that rounding
+/// would matter next.
+const ENOUGH: f64 = 0.5;
 /// Number of times that an orbit is lengthened. The error is at least quartered each time.
 const LENGTHENINGS: usize = 14;
 /// Smallest distance from the equilibria, in units of the sizes of the states, at which rounding does not matter yet.
@@ -175,10 +178,8 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
         _ => None,
     };
     let ends = [(parent.points.first(), 0), (parent.points.last(), 1)];
-    let mut fitting: Vec<(&Point, Option<Connection>)> = ends
-        .into_iter()
-        .filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?)))
-        .collect();
+    let mut fitting: Vec<(&Point, Option<Connection>)> =
+        ends.into_iter().filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?))).collect();
     let near = curve.near.unwrap_or(f64::NAN);
     fitting.sort_by(|a, b| (value(a.0) - near).abs().total_cmp(&(value(b.0) - near).abs()));
     let Some((point, connection)) = fitting.last().filter(|_| curve.near.is_none()).or(fitting.first()) else {
@@ -291,7 +292,10 @@ fn cut<'s>(
     let counts = [count, other.as_ref().map_or(count, |(_, x)| unstable(system, x, &point.parameters))];
     let [Some(count), Some(count_there)] = counts else {
         let state: Vec<String> = places.iter().map(|x| format!("{:.6}", Shown(*x))).collect();
-        return Err(format!("an equilibrium next to the slowest points of the last cycle is not a saddle ({})", state.join(", ")));
+        return Err(format!(
+            "an equilibrium next to the slowest points of the last cycle is not a saddle ({})",
+            state.join(", ")
+        ));
     };
     if count != count_there {
         return Err(format!(
@@ -435,10 +439,11 @@ fn settled<'s>(
         start.point = point;
         let sizes = start.field.sizes(&start.point.parameters);
         let goal = MARGIN * tolerance;
-        if error <= goal {
+        let at_limit = sizes.iter().all(|size| *size < LEAST);
+        if error <= goal || at_limit && error <= ENOUGH * tolerance {
             return Ok(start);
         }
-        if sizes.iter().all(|size| *size < LEAST) || error.is_nan() {
+        if at_limit || error.is_nan() {
             return Err(format!(
                 "the orbit cannot be lengthened until the error of its truncation, {error:.1e}, is below {goal:.1e}\n\
                  likely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where the \

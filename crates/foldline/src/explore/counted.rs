@@ -1,7 +1,7 @@
 //! A vector field that counts its evaluations.
 
-use num_complex::Complex64;
 use crate::contract::{Batch, VectorField};
+use num_complex::Complex64;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A field and its counters. Each side of a branch has its own, so they do not depend on what runs concurrently.

@@ -6,9 +6,9 @@
 //! Results computed meanwhile are wrong, so events are dropped from then on, and the run file holds what was accepted
 //! before.
 
-use num_complex::Complex64;
 use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
 use crate::diagram::{Branch, Point, Shortfall};
+use num_complex::Complex64;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 

@@ -162,6 +162,4 @@ impl Monitor for OnConnection<'_> {
             _ => String::new(),
         }
     }
-
 }
-

@@ -170,7 +170,8 @@ impl Recomputed<'_> {
             .map(|(c, (x, (far, near)))| x + orbit.scale(c) * (near - far))
             .collect();
         let span = side * time / orbit.time_unit(parameters);
-        let back = integrator.state_after(&start, [0.0, span]).ok_or("the integrator did not reach the end of a piece")?;
+        let back =
+            integrator.state_after(&start, [0.0, span]).ok_or("the integrator did not reach the end of a piece")?;
         let both = if end == 0 { [&back[..], &ends[1]] } else { [&ends[0][..], &back] };
         let arrived = &orbit.deviations(both, parameters)[end];
         let off: Vec<f64> = arrived.iter().zip(y).map(|(a, b)| a - b).collect();

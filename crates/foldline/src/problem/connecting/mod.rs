@@ -406,8 +406,7 @@ impl VectorField for ConnectingField<'_> {
                 }
             }
             // (3), (4)
-            let moves: Vec<usize> =
-                (0..q).filter(|c| column(*c).is_some() || place.contains(&free[*c])).collect();
+            let moves: Vec<usize> = (0..q).filter(|c| column(*c).is_some() || place.contains(&free[*c])).collect();
             let turns: Vec<Vec<f64>> = moves
                 .iter()
                 .map(|c| {

@@ -68,7 +68,8 @@ fn the_field_is_measured_per_length_with_exact_derivatives() {
     let parameters = field.parameters(&[14.0, 10.0, 2.7], 4.0, &[0.0; 3], [0.01, 0.01], &[]);
     let at = |parameters: &[f64], x: &[f64]| {
         let mut f = vec![0.0; 3];
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[0.5], signs: &[] };
+        let batch =
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[0.5], signs: &[] };
         field.evaluate(batch, &mut f);
         f
     };
