@@ -3,7 +3,7 @@
 use super::counted::Counted;
 use super::plan::Holds;
 use super::symmetry::{is_rotating_wave, rotation};
-use super::{System, corner};
+use super::{System, corner, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -679,6 +679,12 @@ impl Growth<'_> {
             return Ending::Stopped;
         }
         match ending {
+            Ending::StepTooSmall(why) if branch.family == Family::Torus => {
+                Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))
+            }
+            Ending::MeshTooLarge(why) if branch.family == Family::Torus => {
+                Ending::MeshTooLarge(tori::likely_cause(&latest.borrow(), &why))
+            }
             Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, &latest.borrow(), why)),
             other => other,
         }
