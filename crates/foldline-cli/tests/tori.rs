@@ -71,9 +71,11 @@ fn near(value: f64, known: f64, within: f64) {
 #[track_caller]
 fn mark<'b>(branch: &'b Branch, index: usize, value: f64) -> &'b SpecialPoint {
     let there = |s: &&SpecialPoint| s.kind == Kind::Mark && (s.point.parameters[index] - value).abs() < 1e-9;
-    branch.special.iter().find(there).unwrap_or_else(|| {
-        panic!("no mark at {value} on {}: {:?}", branch.name, branch.ends)
-    })
+    branch
+        .special
+        .iter()
+        .find(there)
+        .unwrap_or_else(|| panic!("no mark at {value} on {}: {:?}", branch.name, branch.ends))
 }
 
 #[test]

@@ -100,7 +100,9 @@ fn of_torus(walk: &mut Walk, value: &Value, source: SeedSource, model: &Model) -
         _ if model.iterated() => "tori of maps are not supported",
         _ if model.conditions() != [0, 0] => "a boundary-value problem has no tori",
         _ if !model.forced() => "`torus` belongs to models with a forcing, which begins to act on a cycle",
-        (SeedSource::Attractor(AttractorKey::Equilibrium), _) => "an equilibrium becomes a cycle under forcing, not a torus",
+        (SeedSource::Attractor(AttractorKey::Equilibrium), _) => {
+            "an equilibrium becomes a cycle under forcing, not a torus"
+        }
         _ => return SeedSource::Torus(Box::new(source)),
     };
     walk.report(value.span(), message, "remove `torus`");

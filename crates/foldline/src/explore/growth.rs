@@ -881,7 +881,7 @@ fn starts_inside(branch: &Branch) -> bool {
     branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_))
 }
 
-/// What a bifurcation of a torus is called, for kinds that are named after those of cycles.
+/// Name of a bifurcation of a torus, for kinds that are named after those of cycles.
 fn on_torus(kind: Kind) -> &'static str {
     match kind {
         Kind::Torus => "quasi-periodic Hopf: a third frequency appears, and the tori with it are not followed",

@@ -102,12 +102,16 @@ pub(super) fn lifted(
         return Err(why.into());
     }
     if !system.field.forced() {
-        return Err("a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into());
+        return Err(
+            "a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into()
+        );
     }
     if acts(system.field, &seed.parameters, &system.ranges) {
-        return Err("the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
+        return Err(
+            "the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
                     not act, so set its amplitude to zero there"
-            .into());
+                .into(),
+        );
     }
     let field = Unforced(system.field);
     let alone = System { field: &field, ..system.clone() };
