@@ -251,6 +251,10 @@ impl Units {
                 x.iter_mut().zip(&self.states).for_each(|(x, factor)| *x /= factor);
                 point.spectrum.iter_mut().for_each(|z| *z *= self.time);
             }
+            Solution::Torus(torus) => {
+                torus.period /= self.time;
+                torus.profile.iter_mut().zip(self.states.iter().cycle()).for_each(|(x, factor)| *x /= factor);
+            }
             Solution::Cycle(cycle) => {
                 cycle.period /= self.time;
                 cycle.profile.iter_mut().zip(self.states.iter().cycle()).for_each(|(x, factor)| *x /= factor);

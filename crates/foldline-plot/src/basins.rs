@@ -71,7 +71,11 @@ pub fn svg(basins: &Basins, plane: &Plane, model: &Model, map: bool) -> String {
             Solution::Equilibrium(state) => Layer::scatter(vec![at(state)], Marker::Circle, palette::BLACK),
             Solution::Torus(torus) => {
                 let states = torus.grid(41, 41);
-                Layer::scatter(states.chunks_exact(plane.through.len()).map(at).collect(), Marker::Circle, palette::BLACK)
+                Layer::scatter(
+                    states.chunks_exact(plane.through.len()).map(at).collect(),
+                    Marker::Circle,
+                    palette::BLACK,
+                )
             }
             Solution::Cycle(cycle) if map => {
                 let states = cycle.profile.chunks_exact(plane.through.len());

@@ -20,7 +20,7 @@ fn computed(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, largest: 
 fn spectrum(point: &BackbonePoint) -> Spectrum {
     match &point.point.solution {
         Solution::Cycle(cycle) => Spectrum::of(cycle, point.speed),
-        Solution::Equilibrium(_) => panic!("a backbone is made of cycles"),
+        Solution::Equilibrium(_) | Solution::Torus(_) => panic!("a backbone is made of cycles"),
     }
 }
 
@@ -136,7 +136,7 @@ fn cubic_orbits_agree_with_quadrature() {
                     let x = cycle.state(0.0);
                     (x[0] * x[3] + (1.0 - 0.5 * polar) * omega * x[0] * x[0]).signum()
                 }
-                Solution::Equilibrium(_) => panic!(),
+                Solution::Equilibrium(_) | Solution::Torus(_) => panic!(),
             };
             let l = sense * momentum;
             for i in 0..STEPS {

@@ -25,7 +25,7 @@ fn found(model: &Model, plane: Option<&Plane>, samples: usize, jobs: usize) -> B
 fn equilibrium(found: &Basins, near: &[f64]) -> usize {
     let at = |k: &usize| match &found.attractors[*k].point.solution {
         Solution::Equilibrium(x) => x.iter().zip(near).all(|(a, b)| (a - b).abs() < 1e-6),
-        Solution::Cycle(_) => false,
+        Solution::Cycle(_) | Solution::Torus(_) => false,
     };
     (0..found.attractors.len()).find(at).unwrap()
 }
@@ -157,7 +157,7 @@ fn a_forced_oscillator_has_basins_at_the_beginning_of_its_period() {
     assert!(basins.plane_fates.iter().all(|fate| matches!(fate, Fate::Settled(_))));
     let mean = |k: usize| match &basins.attractors[k].point.solution {
         Solution::Cycle(cycle) => cycle.uniform(64).chunks(2).map(|x| x[0]).sum::<f64>() / 64.0,
-        Solution::Equilibrium(_) => f64::NAN,
+        Solution::Equilibrium(_) | Solution::Torus(_) => f64::NAN,
     };
     assert!(mean(0) * mean(1) < -0.5);
     // At the bottom of each well.

@@ -165,6 +165,10 @@ fn exactly(diagram: &Diagram) -> String {
     fn of_point(p: &Point) -> String {
         let solution = match &p.solution {
             Solution::Equilibrium(x) => format!("{:?}", bits(x)),
+            Solution::Torus(t) => {
+                let scalars = [t.period, t.rotation];
+                format!("{:?} {:?} {} {:?}", bits(&scalars), bits(&t.mesh), t.degree, bits(&t.profile))
+            }
             Solution::Cycle(c) => {
                 format!("{} {:?} {} {:?}", c.period.to_bits(), bits(&c.mesh), c.degree, bits(&c.profile))
             }
@@ -248,6 +252,7 @@ fn numbers_of(mut diagram: Diagram) -> Diagram {
         point.tangent.clear();
         match &mut point.solution {
             Solution::Equilibrium(x) => x.clear(),
+            Solution::Torus(torus) => (torus.mesh, torus.profile) = (Vec::new().into(), Vec::new()),
             Solution::Cycle(cycle) => (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new()),
         }
     };

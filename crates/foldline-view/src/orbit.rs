@@ -70,9 +70,9 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
             let count = ROUNDS * 48;
             let times: Vec<f64> = (0..count).map(|k| k as f64 / count as f64).collect();
             let place = |time: &f64| (ROUNDS as f64 * time).floor();
-            let states = times.iter().flat_map(|time| {
-                torus.state(torus.rotation * place(time), ROUNDS as f64 * time - place(time))
-            });
+            let states = times
+                .iter()
+                .flat_map(|time| torus.state(torus.rotation * place(time), ROUNDS as f64 * time - place(time)));
             let forcing = f64::from(torus.forcing_periods) * ROUNDS as f64;
             let clock: Vec<f64> = times.iter().map(|time| time * forcing).collect();
             let columns = channels(model, &point.parameters, states.collect(), &clock);

@@ -137,6 +137,7 @@ impl Tour<'_> {
                 changes.push(("NMX", self.limit(FARTHER).to_string()));
                 None
             }
+            Solution::Torus(_) => return Err("the start is no cycle".into()),
             Solution::Cycle(cycle) => {
                 write_start(cycle, &self.auto.start())?;
                 Some(cycle.period)

@@ -37,7 +37,7 @@ fn of_auto(auto: &Auto, changes: &[(&str, &str)], points: usize) -> Outcome<f64>
 fn write(auto: &Auto, point: &Point) -> Outcome<()> {
     match &point.solution {
         Solution::Cycle(cycle) => write_start(cycle, &auto.start()),
-        Solution::Equilibrium(_) => Err("the start is no cycle".into()),
+        Solution::Equilibrium(_) | Solution::Torus(_) => Err("the start is no cycle".into()),
     }
 }
 

@@ -61,7 +61,7 @@ fn point(system: &System, like: &Point, omega: f64, solution: Solution) -> Point
         Solution::Cycle(c) => {
             extremes::of_profile(system.field, &parameters, [&c.profile, &c.mesh], 0, &Scheme::new(c.degree))
         }
-        Solution::Equilibrium(_) => Vec::new(),
+        Solution::Equilibrium(_) | Solution::Torus(_) => Vec::new(),
     };
     Point { parameters, solution, ranges, ..like.clone() }
 }

@@ -1,7 +1,9 @@
 //! Conversion between points and rows.
 
 use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
-use foldline::diagram::{Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Torus, Trust};
+use foldline::diagram::{
+    Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Torus, Trust,
+};
 use rusqlite::Row;
 use rusqlite::types::Value;
 
@@ -159,7 +161,8 @@ fn torus_in(
     rotation: &[u8],
     (mesh, profile): (Vec<f64>, Vec<f64>),
 ) -> Result<Torus, String> {
-    let rotation = unpack(rotation).and_then(|all| all.first().copied()).ok_or("gain_bytes holds no rotation number")?;
+    let rotation =
+        unpack(rotation).and_then(|all| all.first().copied()).ok_or("gain_bytes holds no rotation number")?;
     let degree = usize::try_from(-degree).map_err(|e| e.to_string())?;
     let forcing_periods = u32::try_from(forcing_periods).map_err(|e| e.to_string())?;
     let torus = Torus { period, rotation, forcing_periods, mesh: mesh.into(), degree, profile };

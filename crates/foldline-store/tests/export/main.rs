@@ -163,7 +163,7 @@ fn parquet_has_the_same_bits() {
     }
     let cycles = all.iter().filter_map(|point| match &point.solution {
         Solution::Cycle(cycle) => Some(nodes(cycle)),
-        Solution::Equilibrium(_) => None,
+        Solution::Equilibrium(_) | Solution::Torus(_) => None,
     });
     let states: Vec<Vec<f64>> = cycles.flatten().map(|(_, state)| state).collect();
     let found = rows("profiles");

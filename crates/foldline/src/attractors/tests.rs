@@ -41,6 +41,7 @@ fn survey_of(field: &Field, parameters: &[f64], sampling: &Sampling) -> Census {
 fn radii(solution: &Solution) -> [f64; 2] {
     let states = match solution {
         Solution::Equilibrium(x) => x.clone(),
+        Solution::Torus(torus) => torus.section(0.0),
         Solution::Cycle(cycle) => cycle.uniform(4000),
         Solution::Torus(_) => panic!("no torus is sampled"),
     };

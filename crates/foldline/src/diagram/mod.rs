@@ -191,7 +191,9 @@ impl Point {
         match &self.solution {
             Solution::Cycle(cycle) if cycle.forcing_periods == 0 => self.spectrum.get(1..).unwrap_or(&[]),
             // Perturbations along the torus.
-            Solution::Torus(torus) => self.spectrum.get(if torus.forcing_periods == 0 { 2 } else { 1 }..).unwrap_or(&[]),
+            Solution::Torus(torus) => {
+                self.spectrum.get(if torus.forcing_periods == 0 { 2 } else { 1 }..).unwrap_or(&[])
+            }
             _ => &self.spectrum,
         }
     }

@@ -21,7 +21,10 @@ const SHARPER: f64 = 0.2;
 /// A sentence that lists the special points of the branch, if none fits.
 pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoint, String> {
     if branch.family == Family::Torus {
-        return Err(format!("bifurcations of tori cannot be continued in two parameters ({} is a branch of tori)", branch.name));
+        return Err(format!(
+            "bifurcations of tori cannot be continued in two parameters ({} is a branch of tori)",
+            branch.name
+        ));
     }
     let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
     let fitting = branch.special.iter().filter(|special| special.kind == plan.hold);

@@ -3,7 +3,7 @@
 use super::counted::Counted;
 use super::plan::Holds;
 use super::symmetry::{is_rotating_wave, rotation};
-use super::{System, corner, impacts as beside_impacts};
+use super::{System, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -734,6 +734,12 @@ impl Growth<'_> {
             Ending::GivenUp(why) if branch.is_connecting() => {
                 Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
             }
+            Ending::StepTooSmall(why) if branch.family == Family::Torus => {
+                Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))
+            }
+            Ending::MeshTooLarge(why) if branch.family == Family::Torus => {
+                Ending::MeshTooLarge(tori::likely_cause(&latest.borrow(), &why))
+            }
             Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, &latest.borrow(), why)),
             other => other,
         }
@@ -977,7 +983,7 @@ fn starts_inside(branch: &Branch) -> bool {
     branch.held.is_some() || inside
 }
 
-/// What a bifurcation of a torus is called, for kinds that are named after those of cycles.
+/// Name of a bifurcation of a torus, for kinds that are named after those of cycles.
 fn on_torus(kind: Kind) -> &'static str {
     match kind {
         Kind::Torus => "quasi-periodic Hopf: a third frequency appears, and the tori with it are not followed",

@@ -4,8 +4,8 @@
 //! vector orthogonal to the tangent, the Hopf eigenvector. A first point is found by Newton's method in the hyperplane
 //! a small step along that direction, which the original branch does not reach to first order.
 
-use super::{System, tori};
 use super::growth::{Beginning, problem_of, setting};
+use super::{System, tori};
 use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, station};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};

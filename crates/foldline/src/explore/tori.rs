@@ -12,7 +12,7 @@ use super::unforced::{Unforced, acts};
 use crate::continuation::{Settings, Station};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cycle, Point, Solution, SpecialPoint};
-use crate::problem::torus::{TorusProblem, start};
+use crate::problem::torus::{LARGEST, TorusProblem, start};
 use num_complex::Complex64;
 
 /// Why tori of a model cannot be computed, if they cannot.
@@ -102,12 +102,16 @@ pub(super) fn lifted(
         return Err(why.into());
     }
     if !system.field.forced() {
-        return Err("a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into());
+        return Err(
+            "a seed with `torus = true` is a cycle on which a forcing begins to act; this model has none".into()
+        );
     }
     if acts(system.field, &seed.parameters, &system.ranges) {
-        return Err("the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
+        return Err(
+            "the forcing acts at the parameters of this seed; with `torus = true` it begins where the forcing does \
                     not act, so set its amplitude to zero there"
-            .into());
+                .into(),
+        );
     }
     let field = Unforced(system.field);
     let alone = System { field: &field, ..system.clone() };
@@ -118,4 +122,43 @@ pub(super) fn lifted(
     };
     let torus = start::lifted(cycle, system.field.time_unit(&seed.parameters));
     Ok(Point { solution: Solution::Torus(torus), tangent: Vec::new(), ..point })
+}
+
+/// The text of an ending at a torus: what was tried, from the text of the continuation, then a likely cause and what can
+/// be done.
+pub(super) fn likely_cause(last: &Point, why: &str) -> String {
+    /// Distance of the rotation number from a ratio below which the motion is suspected to lock.
+    const CLOSE: f64 = 3e-3;
+    const HIGHEST: u32 = 8;
+    let Solution::Torus(torus) = &last.solution else { return why.into() };
+    let tried = why.lines().next().unwrap_or_default();
+    let off = |q: u32| {
+        let turns = torus.rotation * f64::from(q);
+        (turns - turns.round()).abs() / f64::from(q)
+    };
+    let ratio = (1..=HIGHEST).find(|q| off(*q) < CLOSE);
+    let many = torus.phases() >= 2 * LARGEST - 1;
+    let cause = match (ratio, many) {
+        (Some(q), _) => format!(
+            "the rotation number {:.6} is close to {}/{q}: the torus probably locks to a cycle of {q} periods",
+            torus.rotation,
+            (torus.rotation * f64::from(q)).round()
+        ),
+        (None, true) => format!(
+            "the torus is no longer smooth: its harmonics decay too slowly for {} trajectories, as before a break-up, at \
+             locking, or with a stiff contact (rotation number {:.6})",
+            torus.phases(),
+            torus.rotation
+        ),
+        (None, false) => format!(
+            "none is known; the torus has {} trajectories and the rotation number {:.6}",
+            torus.phases(),
+            torus.rotation
+        ),
+    };
+    let cure = match ratio {
+        Some(_) => "a `[[seed]]` with `attractor = \"cycle\"` beyond this value finds the locked cycle",
+        None => "a `[[sweep]]` over this value shows what the motion becomes; or a larger `tolerance`",
+    };
+    format!("{tried}\nlikely cause: {cause}\nwhat to do: {cure}")
 }

@@ -15,11 +15,8 @@ pub(super) fn acts(field: &dyn VectorField, parameters: &[f64], ranges: &[[f64; 
     const SAME: f64 = 1e-12;
     let share = |k: usize| (0.5 + k as f64 * 0.618_033_988_7).fract();
     (0..PLACES).any(|place| {
-        let states: Vec<f64> = ranges
-            .iter()
-            .enumerate()
-            .map(|(i, [low, high])| low + share(i * PLACES + place) * (high - low))
-            .collect();
+        let states: Vec<f64> =
+            ranges.iter().enumerate().map(|(i, [low, high])| low + share(i * PLACES + place) * (high - low)).collect();
         let at = |time: f64| {
             let mut f = vec![0.0; states.len()];
             let parameters = Parameters::Shared(parameters);

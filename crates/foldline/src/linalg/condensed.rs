@@ -300,7 +300,7 @@ impl<T: Lane> Condensed<T> {
         self.apart = Some(Remainder::default());
     }
 
-    /// What the last elimination left of free ends.
+    /// The relation between free ends that the last elimination left.
     pub fn remainder(&self) -> Option<&Remainder> {
         self.apart.as_ref()
     }
@@ -636,7 +636,9 @@ impl<T: Lane> Condensed<T> {
     fn reduced(&mut self, corner: &[f64], together: bool) -> Result<(), Singular> {
         let Condensed { n, q, closure, length, .. } = *self;
         let (width, full) = (n + q, 3 * n + q);
-        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, open, apart, own_units, .. } = self;
+        let Condensed {
+            step, condensed_border, pieces, scale, products, gentle, whole, open, apart, own_units, ..
+        } = self;
         let (step, condensed_border) = (&step[..length * n * width], &condensed_border[..length * q * n]);
         *gentle = together;
         if together {
@@ -758,7 +760,7 @@ impl<T: Lane> Condensed<T> {
     }
 }
 
-/// How far to solve.
+/// The part of the solution that is asked for.
 enum Stage<'a> {
     Whole,
     /// To the relation between the ends and the border.

@@ -55,9 +55,7 @@ impl Monitor for BranchPoint {
     }
 
     fn smooth(&self, at: &Point) -> Option<f64> {
-        if at.solution.period().is_none() {
-            return None;
-        }
+        at.solution.period()?;
         // Coefficients of the characteristic polynomial, the highest power first.
         let mut polynomial = vec![Complex64::new(1.0, 0.0)];
         for z in self.spectrum_without_symmetry(at) {

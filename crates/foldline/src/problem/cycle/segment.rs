@@ -85,7 +85,7 @@ impl<'a> CycleProblem<'a> {
         Ok(self.trace)
     }
 
-    /// What the elimination left of the ends.
+    /// The relation between the ends that the elimination left.
     pub(in crate::problem) fn remainder(&self) -> Option<&Remainder> {
         self.system.remainder()
     }

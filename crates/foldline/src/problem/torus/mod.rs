@@ -39,6 +39,7 @@ use super::{Setting, mesh};
 use crate::contract::{Examination, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Torus, Trust};
 use crate::linalg::{all_finite, larger, same};
+pub use errors::LARGEST;
 use joint::Joint;
 use std::cell::RefCell;
 

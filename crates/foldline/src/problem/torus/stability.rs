@@ -101,7 +101,8 @@ impl TorusProblem<'_> {
         let change: Mat<f64> = Mat::from_fn(count, count, |k, l| rate[(k + count - l) % count]);
         let (mut sums, mut norms) = (vec![[0.0; 2]; vectors.ncols()], vec![0.0; vectors.ncols()]);
         for c in 0..n {
-            let part = |of: fn(&Complex64) -> f64| Mat::from_fn(count, vectors.ncols(), |k, v| of(&vectors[(k * n + c, v)]));
+            let part =
+                |of: fn(&Complex64) -> f64| Mat::from_fn(count, vectors.ncols(), |k, v| of(&vectors[(k * n + c, v)]));
             let (real, imaginary) = (part(|z| z.re), part(|z| z.im));
             let [by_real, by_imaginary] = [&real, &imaginary].map(|own| foldline_general::product(&change, own));
             for v in 0..vectors.ncols() {

@@ -71,7 +71,8 @@ pub fn at_torus_point(setting: Setting, cycle: &Cycle, multiplier: Complex64) ->
         degree: m,
         profile: Vec::new(),
     };
-    let base = laid(like, n, PHASES, &cycle.mesh, |_, node, x| x.copy_from_slice(&cycle.profile[node * n..(node + 1) * n]));
+    let base =
+        laid(like, n, PHASES, &cycle.mesh, |_, node, x| x.copy_from_slice(&cycle.profile[node * n..(node + 1) * n]));
     let around = laid(base.clone(), n, PHASES, &cycle.mesh, |k, node, x| {
         let turn = Complex64::cis(std::f64::consts::TAU * k as f64 / PHASES as f64);
         for (x, q) in x.iter_mut().zip(&direction[node * n..(node + 1) * n]) {
@@ -89,8 +90,7 @@ pub fn lifted(cycle: &Cycle, period: f64) -> Torus {
     let time = mesh::uniform(((cycle.intervals() as f64 * rotation.max(0.5)).ceil() as usize).clamp(10, 400));
     // As many phases as resolve the cycle, which are reduced later.
     let count = 2 * (2 * cycle.intervals()).clamp(PHASES / 2, 40) + 1;
-    let like =
-        Torus { period, rotation, forcing_periods: 1, mesh: Mesh::default(), degree: m, profile: Vec::new() };
+    let like = Torus { period, rotation, forcing_periods: 1, mesh: Mesh::default(), degree: m, profile: Vec::new() };
     laid(like, n, count, &time, |k, node, x| {
         let (j, i) = (node / (m + 1), node % (m + 1));
         let t = time[j] + (time[j + 1] - time[j]) * scheme.nodes[i];
@@ -100,32 +100,32 @@ pub fn lifted(cycle: &Cycle, period: f64) -> Torus {
 
 /// Direction q of (1), `[N][m + 1][n]`, for the multiplier nearest to the given one, and the angle θ of that multiplier.
 fn rotating_direction(setting: Setting, cycle: &Cycle, multiplier: Complex64) -> Option<(Vec<Complex64>, f64)> {
-        let (n, m, count) = (cycle.dim(), cycle.degree, cycle.intervals());
-        let unknowns = setting.axes.iter().map(|axis| setting.parameters[axis.index] / axis.scale).collect::<Vec<_>>();
-        let time = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
-        let u = [&cycle.profile[..], &[time], &unknowns].concat();
-        let mut problem = CycleProblem::like(setting, cycle);
-        problem.anchor(&u);
-        let (transitions, inner) = problem.transports_at(&u)?;
-        let mut monodromy: Mat<f64> = Mat::from_fn(n, n, |i, c| f64::from(u8::from(i == c)));
-        for own in transitions.chunks_exact(n * n) {
-            let step = Mat::from_fn(n, n, |i, c| own[i * n + c]);
-            monodromy = foldline_general::product(&step, &monodromy);
-        }
-        let (values, vectors) = foldline_general::eigenvectors(monodromy.as_ref())?;
-        let off = |z: &Complex64| (z - multiplier).norm();
-        let at = (0..n).min_by(|a, b| off(&values[*a]).total_cmp(&off(&values[*b])))?;
-        let mut x: Vec<Complex64> = (0..n).map(|i| vectors[(i, at)]).collect();
-        let carried = |matrix: &dyn Fn(usize, usize) -> f64, x: &[Complex64]| -> Vec<Complex64> {
-            (0..n).map(|i| (0..n).map(|c| matrix(i, c) * x[c]).sum()).collect()
-        };
-        let mut all = Vec::with_capacity(count * (m + 1) * n);
-        for j in 0..count {
-            all.extend_from_slice(&x);
-            for k in 0..m {
-                all.extend(carried(&|i, c| inner[((k * n + i) * n + c) * count + j], &x));
-            }
-            x = carried(&|i, c| transitions[(j * n + i) * n + c], &x);
-        }
-        Some((all, values[at].arg()))
+    let (n, m, count) = (cycle.dim(), cycle.degree, cycle.intervals());
+    let unknowns = setting.axes.iter().map(|axis| setting.parameters[axis.index] / axis.scale).collect::<Vec<_>>();
+    let time = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    let u = [&cycle.profile[..], &[time], &unknowns].concat();
+    let mut problem = CycleProblem::like(setting, cycle);
+    problem.anchor(&u);
+    let (transitions, inner) = problem.transports_at(&u)?;
+    let mut monodromy: Mat<f64> = Mat::from_fn(n, n, |i, c| f64::from(u8::from(i == c)));
+    for own in transitions.chunks_exact(n * n) {
+        let step = Mat::from_fn(n, n, |i, c| own[i * n + c]);
+        monodromy = foldline_general::product(&step, &monodromy);
     }
+    let (values, vectors) = foldline_general::eigenvectors(monodromy.as_ref())?;
+    let off = |z: &Complex64| (z - multiplier).norm();
+    let at = (0..n).min_by(|a, b| off(&values[*a]).total_cmp(&off(&values[*b])))?;
+    let mut x: Vec<Complex64> = (0..n).map(|i| vectors[(i, at)]).collect();
+    let carried = |matrix: &dyn Fn(usize, usize) -> f64, x: &[Complex64]| -> Vec<Complex64> {
+        (0..n).map(|i| (0..n).map(|c| matrix(i, c) * x[c]).sum()).collect()
+    };
+    let mut all = Vec::with_capacity(count * (m + 1) * n);
+    for j in 0..count {
+        all.extend_from_slice(&x);
+        for k in 0..m {
+            all.extend(carried(&|i, c| inner[((k * n + i) * n + c) * count + j], &x));
+        }
+        x = carried(&|i, c| transitions[(j * n + i) * n + c], &x);
+    }
+    Some((all, values[at].arg()))
+}

@@ -52,9 +52,9 @@ impl TorusProblem<'_> {
             (self.time[j + 1] - self.time[j]) * share / fine as f64
         };
         let mean = |line: &[f64]| {
-            line.iter().enumerate().fold([0.0; 2], |[once, squared], (at, v)| {
-                [once + weight(at) * v, squared + weight(at) * v * v]
-            })
+            line.iter()
+                .enumerate()
+                .fold([0.0; 2], |[once, squared], (at, v)| [once + weight(at) * v, squared + weight(at) * v * v])
         };
         (ranges.collect(), all.chunks_exact(lanes).map(mean).collect())
     }
@@ -155,7 +155,8 @@ impl TorusProblem<'_> {
             }
             out
         };
-        let scalars = [&[f64::from(self.forcing_periods), torus.rotation][..], &self.setting.unknowns_of(point)].concat();
+        let scalars =
+            [&[f64::from(self.forcing_periods), torus.rotation][..], &self.setting.unknowns_of(point)].concat();
         let u = [turn(&profile), scalars].concat();
         let along = [&turn(&tangent)[..], &point.tangent[whole..]].concat();
         let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
