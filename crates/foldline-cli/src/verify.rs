@@ -4,6 +4,7 @@ use crate::arguments::{Format, Verify as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
 use crate::table::{self, Cell, Column, Style, Table};
+use foldline::contract::VectorField;
 use foldline::explore::System;
 use foldline::verify::{Check, Quantity, Verified, verify};
 use foldline_store::run_file::Part;
@@ -29,7 +30,13 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if typed.format == Format::Text {
         summary(&verified, wrong, &mut stdout().lock())?;
     }
-    Ok(if wrong > 0 { Outcome::Wrong } else { Outcome::Done })
+    // Nothing is known about a run of which nothing can be recomputed.
+    let nothing = run.model.event_count() > 0 && verified.checks.is_empty() && !verified.undecided.is_empty();
+    Ok(match (wrong > 0, nothing) {
+        (true, _) => Outcome::Wrong,
+        (false, true) => Outcome::Short,
+        (false, false) => Outcome::Done,
+    })
 }
 
 fn listed(checks: &[&Check]) -> Table {
