@@ -77,7 +77,7 @@ fn a_response_with_impacts_is_followed_to_its_grazings() {
     assert!((w - 2.0).abs() < 1e-12 && (last.ranges[0][1] - linear).abs() < 1e-7, "{w}: {:?}", last.ranges);
 }
 
-/// Where the stop is touched once more.
+/// A second touch of the stop within the period.
 #[test]
 fn a_second_touch_is_located() {
     let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.69, 1.1]\nmax_points = 400\n"));
