@@ -89,7 +89,8 @@ pub(super) fn through(system: &System, parameters: &[f64], settings: &Settings, 
     let absolute = system.scales.iter().chain(&[1.0]).map(|scale| INTEGRATION * scale).collect();
     let integrator = Integrator::new(&field, parameters, Tolerance { relative: INTEGRATION, absolute })
         .with_step_limit(system.limits.steps);
-    let (mut returns, mut last): (Vec<(f64, Vec<f64>)>, Option<Vec<f64>>) = (Vec::new(), None);
+    let mut returns: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut last: Option<Vec<f64>> = None;
     let (mut x, mut end) = (vec![0.0; n + 1], vec![0.0; n + 1]);
     let from = [state, &[0.0]].concat();
     integrator.trajectory(&from, [0.0, f64::MAX], &[], &mut |passage| {
@@ -201,7 +202,7 @@ fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
     let count = flights.flights.len();
     let whole: f64 = flights.flights.iter().map(|(last, _)| last).sum();
     for turns in (2..=count).rev() {
-        if count % turns != 0 || q > 0 && !q.is_multiple_of(turns as u32) {
+        if !count.is_multiple_of(turns) || q > 0 && !q.is_multiple_of(turns as u32) {
             continue;
         }
         let own = count / turns;
