@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from ._model import Model
 
 #: Names of the endings, as numbered by the compiled half and by kernels.
-ENDINGS = np.array(["reached", "stopped", "escaped", "undefined", "step-too-small", "step-limit", "slides"])
+ENDINGS = np.array(["reached", "stopped", "escaped", "undefined", "step-too-small", "step-limit", "slides", "chatter"])
 #: A trajectory that a kernel does not follow: it slides along the surface of a switch.
 SLIDES = 6
 
@@ -35,7 +35,7 @@ class Ensemble:
     times : array, shape (count,)
         Times at which the trajectories ended, in the time unit of the model.
     endings : array of str, shape (count,)
-        ``"reached"``, ``"escaped"``, ``"undefined"``, ``"step-too-small"`` or ``"step-limit"``.
+        ``"reached"``, ``"escaped"``, ``"undefined"``, ``"step-too-small"``, ``"step-limit"`` or ``"chatter"``.
     steps, rejected : arrays of int, shape (count,)
         Numbers of accepted and rejected steps.
     device : str

@@ -33,7 +33,7 @@ class Trajectory:
         Outputs in their units.
     ending : str
         ``"reached"``, ``"escaped"``, ``"undefined"`` (the trajectory left the region in which f is defined),
-        ``"step-too-small"``, ``"step-limit"`` or ``"stopped"``.
+        ``"step-too-small"``, ``"step-limit"``, ``"chatter"`` or ``"stopped"``.
 
     Examples
     --------

@@ -44,11 +44,14 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         writeln!(out, "{}", line(attractor, &model))?;
     }
     let samples = typed.samples;
-    let stuck = if census.stuck > 0 {
+    let mut stuck = if census.stuck > 0 {
         format!(", {} stopped because the step size became too small", census.stuck)
     } else {
         String::new()
     };
+    if census.chattered > 0 {
+        stuck += &format!(", {} ended in chatter", census.chattered);
+    }
     let exits = match &census.exits[..] {
         [] => String::new(),
         exits => format!(", {} left the region where the vector field is defined", exits.len()),

@@ -77,7 +77,7 @@ fn a_response_with_impacts_is_followed_to_its_grazings() {
     assert!((w - 2.0).abs() < 1e-12 && (last.ranges[0][1] - linear).abs() < 1e-7, "{w}: {:?}", last.ranges);
 }
 
-/// Where the stop is touched once more.
+/// A second touch of the stop within the period.
 #[test]
 fn a_second_touch_is_located() {
     let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.69, 1.1]\nmax_points = 400\n"));
@@ -125,4 +125,24 @@ fn unstable_cycles_of_a_rotor_in_a_rigid_ring() {
             assert!(off < 1e-6 * known.max(1.0), "{known}: {:?}", point.spectrum);
         }
     }
+}
+
+/// A self-excited oscillator inside a stop: the speed of the impact vanishes like the square root of the distance, which
+/// is no fold.
+#[test]
+fn an_autonomous_oscillator_leaves_its_stop() {
+    let model = "name = \"self-excited\"\n[parameters]\nmu = 0.5\nd = 1.5\ne = 0.6\n\
+        [states.\"x''\"]\nequation = \"mu*(1 - x^2)*x' - x\"\nrange = [-2, 1.4]\nvelocity = { range = [-2, 2] }\n\
+        [contact.stop]\nat = \"x\"\nclearance = \"d\"\nrestitution = \"e\"\n";
+    let diagram = run(model, &SEED.replace("\"w\"", "\"d\"").replace("[[branch]]", "[[branch]]\nrange = [1.4, 2.2]"));
+    let own = branch(&diagram, "b");
+    // Integrated with event location.
+    let period = start(own).solution.period().unwrap();
+    assert!((period - 4.910_461_493_524).abs() < 1e-8, "{period}");
+    let kinds: Vec<Kind> = own.special.iter().map(|special| special.kind).collect();
+    assert_eq!(kinds, [Kind::ImpactGrazing]);
+    assert!(own.special[0].remark.starts_with("persistence"), "{}", own.special[0].remark);
+    // There d is the amplitude of the cycle without impacts.
+    let free = own.points.iter().find(|point| point.parameters[1] > 2.1).unwrap();
+    assert!((own.special[0].point.parameters[1] - free.ranges[0][1]).abs() < 1e-7);
 }

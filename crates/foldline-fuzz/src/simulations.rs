@@ -64,7 +64,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     let parameters = study.model.defaults();
     let census = explore::attractors(&system, &parameters, STARTS, 1, 1, study.plan.tolerance);
     let hits: usize = census.attractors.iter().map(|attractor| attractor.hits).sum();
-    let lost = census.escaped + census.exits.len() + census.stuck + census.unsettled + census.left;
+    let lost = census.escaped + census.exits.len() + census.stuck + census.chattered + census.unsettled + census.left;
     assert_eq!(hits + lost, STARTS, "samples of\n{model}");
     Ok(())
 }

@@ -93,7 +93,7 @@ fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
 
 /// True if the branch has a corner at a special point: its direction jumps there.
 fn has_corner(special: &SpecialPoint) -> bool {
-    special.kind == Kind::BoundaryEquilibrium
+    matches!(special.kind, Kind::BoundaryEquilibrium | Kind::ImpactGrazing)
         || special.kind == Kind::Grazing && special.remark.starts_with("grazing-sliding")
 }
 

@@ -60,7 +60,7 @@ fn number(outcome: Outcome) -> i64 {
         Outcome::Undefined => 3,
         Outcome::StepTooSmall => 4,
         Outcome::StepLimit => 5,
-        Outcome::Chatter => 6,
+        Outcome::Chatter => 7,
     }
 }
 

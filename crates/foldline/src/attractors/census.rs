@@ -223,7 +223,8 @@ fn add(
             Fate::Escaped => census.escaped += 1,
             // Already counted in `exits`.
             Fate::Undefined => {}
-            Fate::Stuck | Fate::Chatter => census.stuck += 1,
+            Fate::Stuck => census.stuck += 1,
+            Fate::Chatter => census.chattered += 1,
             Fate::Left => census.left += 1,
         }
     }

@@ -109,6 +109,8 @@ pub struct Census {
     pub exits: Vec<Exit>,
     /// Number of trajectories whose step size became too small: f jumps, or is too stiff for the method.
     pub stuck: usize,
+    /// Number of trajectories whose events, such as impacts, accumulate.
+    pub chattered: usize,
     /// Number of samples not integrated to the end, or not at all, because enough was known; see [`survey_until`].
     pub left: usize,
     /// `[samples]` outcome of each initial state, in their order; those not begun are missing.

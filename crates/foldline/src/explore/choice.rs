@@ -119,6 +119,10 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
     if census.stuck > 0 {
         parts.push(format!("stopped because the step size became too small ({})", census.stuck));
     }
+    if census.chattered > 0 {
+        let count = census.chattered;
+        parts.push(format!("ended in chatter, where impacts accumulate and lasting contact follows ({count})"));
+    }
     if census.left > 0 {
         parts.push(format!("not needed ({})", census.left));
     }

@@ -637,6 +637,12 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
+                    // The parameter may be stationary where the speed of an impact vanishes; that is no fold.
+                    if matches!(special.kind, Kind::Fold | Kind::BranchPoint)
+                        && beside_impacts::grazes(system.field, &special.point)
+                    {
+                        return Verdict::Continue;
+                    }
                     let plain = special.clone();
                     if special.kind == Kind::ImpactGrazing {
                         let found =
@@ -814,7 +820,14 @@ impl Growth<'_> {
         };
         let towards = if side == 1 { 1.0 } else { -1.0 };
         let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
-        let before = -towards * special.point.parameter_slope();
+        // Where the parameter is stationary, as in autonomous oscillators, the last point decides.
+        const STATIONARY: f64 = 1e-4;
+        let slope = special.point.parameter_slope();
+        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
+        let before = match last {
+            Some(last) if slope.abs() < STATIONARY => value(last) - value(&special.point),
+            _ => -towards * slope,
+        };
         let kind = match (value(&next.point) - value(&special.point)) * before > 0.0 {
             true => "non-smooth fold",
             false => "persistence",

@@ -9,8 +9,8 @@ use crate::attractors::Candidate;
 use crate::continuation::Settings;
 use crate::continuation::Station;
 use crate::continuation::corrector::{Plane, correct, parameter_row, settle};
-use crate::contract::{Examination, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Point, Solution};
+use crate::contract::{Examination, VectorField, Verdict, ZeroProblem};
+use crate::diagram::{Cost, Cycle, Point, Solution};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::gauss::Scheme;
 use crate::problem::impact::stored::{Impact, after, impacts, surfaces, times_of, with_node};
@@ -89,7 +89,8 @@ pub(super) fn through(system: &System, parameters: &[f64], settings: &Settings, 
     let absolute = system.scales.iter().chain(&[1.0]).map(|scale| INTEGRATION * scale).collect();
     let integrator = Integrator::new(&field, parameters, Tolerance { relative: INTEGRATION, absolute })
         .with_step_limit(system.limits.steps);
-    let (mut returns, mut last): (Vec<(f64, Vec<f64>)>, Option<Vec<f64>>) = (Vec::new(), None);
+    let mut returns: Vec<(f64, Vec<f64>)> = Vec::new();
+    let mut last: Option<Vec<f64>> = None;
     let (mut x, mut end) = (vec![0.0; n + 1], vec![0.0; n + 1]);
     let from = [state, &[0.0]].concat();
     integrator.trajectory(&from, [0.0, f64::MAX], &[], &mut |passage| {
@@ -201,7 +202,7 @@ fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
     let count = flights.flights.len();
     let whole: f64 = flights.flights.iter().map(|(last, _)| last).sum();
     for turns in (2..=count).rev() {
-        if count % turns != 0 || q > 0 && !q.is_multiple_of(turns as u32) {
+        if !count.is_multiple_of(turns) || q > 0 && !q.is_multiple_of(turns as u32) {
             continue;
         }
         let own = count / turns;
@@ -217,6 +218,25 @@ fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
         }
     }
     (flights, q)
+}
+
+/// True if an event of a cycle has hardly any speed.
+pub(super) fn grazes(field: &dyn VectorField, at: &Point) -> bool {
+    /// Speed, relative to that of an oscillation of the same size.
+    const SLOW: f64 = 1e-4;
+    let Solution::Cycle(cycle) = &at.solution else { return false };
+    if field.event_count() == 0 {
+        return false;
+    }
+    let all = impacts(field, &at.parameters, cycle);
+    let least = all.iter().map(|own| speed(field, &at.parameters, cycle, own).abs()).fold(f64::INFINITY, f64::min);
+    least < SLOW * usual(cycle, highest(field, &at.parameters, cycle).size)
+}
+
+/// Speed of an oscillation of a size with the period of a cycle, in the time of the field.
+fn usual(cycle: &Cycle, size: f64) -> f64 {
+    let whole = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    size * std::f64::consts::TAU / whole
 }
 
 /// A problem with another sequence of events, and a point of it.
@@ -238,9 +258,7 @@ pub(super) fn beyond<'a>(
     let speeds: Vec<f64> = all.iter().map(|own| speed(field, parameters, cycle, own).abs()).collect();
     let slowest = (0..all.len()).min_by(|a, b| speeds[*a].total_cmp(&speeds[*b]));
     let touch = highest(field, parameters, cycle);
-    // The speed of an oscillation of that size.
-    let whole = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
-    let usual = touch.size * std::f64::consts::TAU / whole;
+    let usual = usual(cycle, touch.size);
     let vanishes = slowest.filter(|k| speeds[*k] / usual < touch.value.abs() / touch.size);
     let own = setting(system, free, parameters);
     let (mut problem, u): (Box<dyn ZeroProblem + 'a>, Vec<f64>) = match vanishes {

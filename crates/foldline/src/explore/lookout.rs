@@ -94,7 +94,7 @@ impl<'l> Lookout<'l> {
             ),
             false => format!("at {}: {}; equilibria up to symmetry: {rests}", Shown(value), summary(system, &census)),
         };
-        Sight { value, unsettled: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
+        Sight { value, unsettled: census.unsettled + census.stuck + census.chattered > 0, found: Ok((found, said)) }
     }
 
     /// Returns the equilibria in the ranges of the states, stable or not.

@@ -217,7 +217,7 @@ fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle)
     Some((Box::new(problem), base, direction))
 }
 
-/// The same for cycles with events. Over two turns, a period doubling is a branch point.
+/// Problem, unknowns and direction of [`double`] for cycles with events. Over two turns, a period doubling is a branch point.
 fn double_flights<'a>(
     system: &'a System,
     free: usize,

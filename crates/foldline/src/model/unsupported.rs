@@ -24,9 +24,9 @@ const KINDS: [Kind; 15] = [
     ),
     (
         &["reset", "jump", "event", "guard", "impact", "restitution", "hybrid", "transition"],
-        "states that jump (resets, impacts with a coefficient of restitution) are not supported",
-        "model the contact as a stiff force, such as k*max(x - gap, 0), with damping while in contact; switching is \
-         located exactly. For true resets use COCO or TC-HAT",
+        "states that jump are written as [events.NAME], walls as [contact.NAME]",
+        "write `[events.stop]` with `when = \"x - d\"` and `set = { v = \"-e*v\" }`, or `[contact.stop]` with `at = \"x\"`, \
+         `clearance` and `restitution`",
     ),
     (
         &["boundarie", "boundarycondition", "bc", "bvp", "nbc", "nint"],

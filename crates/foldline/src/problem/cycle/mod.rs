@@ -190,7 +190,7 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
-    /// The same problem with another setting of as many states, conditions and free parameters.
+    /// This problem with another setting of as many states, conditions and free parameters.
     pub(in crate::problem) fn rehoused<'b>(self, setting: Setting<'b>) -> CycleProblem<'b> {
         let CycleProblem {
             setting: _,

@@ -206,7 +206,7 @@ impl Flights {
         (0..self.events.len()).filter_map(off).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(first, _)| first)
     }
 
-    /// The same flights, beginning with another one, at the phase that is closest to the one given.
+    /// These flights, beginning with another one, at the phase that is closest to the one given.
     pub fn starting(&self, first: usize, forcing_periods: u32, phase: f64) -> Flights {
         let (mut own, q) = (self.clone(), f64::from(forcing_periods));
         own.events.rotate_left(first);
