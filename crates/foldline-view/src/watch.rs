@@ -337,7 +337,11 @@ impl Watch {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(crate) fn place(&self, branch: i64, place: Place) -> Result<Option<(String, Point, Option<(Kind, usize)>)>, RunFileError> {
+    pub(crate) fn place(
+        &self,
+        branch: i64,
+        place: Place,
+    ) -> Result<Option<(String, Point, Option<(Kind, usize)>)>, RunFileError> {
         let reading = Reading::open(&self.folder())?;
         let Some(span) = reading.spans()?.into_iter().find(|span| span.number == branch) else { return Ok(None) };
         match place {
