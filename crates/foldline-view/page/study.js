@@ -81,7 +81,7 @@ export class Desk {
       : this.busy || !this.changed || mistaken || draft || !this.fresh ? this.said
       : "Nothing computed so far fits: this starts a run in a new folder and keeps the one shown.";
     for (const { go, drop, undo, note } of this.rows) {
-      go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute anew" : shorter ? "Remove" : "Compute";
+      go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute again" : shorter ? "Remove" : "Compute";
       go.disabled = (!this.changed && !draft) || this.busy || this.fixed !== null || mistaken || !checked;
       go.classList.toggle("first", !go.disabled);
       drop.disabled = !this.changed || this.busy;

@@ -48,7 +48,7 @@ impl From<io::Error> for Refused {
 #[derive(Clone)]
 pub struct Desk(Arc<Inner>);
 
-/// Where study, model and run are.
+/// Files of a run.
 #[derive(Clone, Debug)]
 pub struct Files {
     /// The study file.
@@ -64,7 +64,7 @@ pub struct Files {
 pub struct Example {
     /// Its name, also that of its folder.
     pub name: String,
-    /// What it is about.
+    /// Its subject, in a sentence.
     pub about: String,
     /// Text of the model.
     pub model: String,

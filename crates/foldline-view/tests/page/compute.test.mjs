@@ -187,7 +187,7 @@ test("a model is edited and computed beside its diagram, each time in a new fold
   assert.ok(existsSync(join(folder, "decayed/run.sqlite")));
   await own.click('#log-tabs button:text-is("Model")');
   await own.fill("#log textarea", first);
-  await press(own, "Compute anew");
+  await press(own, "Compute again");
   await own.waitForFunction(() => window.foldline?.app.ready && window.foldline.app.run.about.folder.endsWith("decayed-2") && window.foldline.app.run.listed().some((branch) => branch.length > 3));
   assert.ok(existsSync(join(folder, "decayed/run.sqlite")) && existsSync(join(folder, "decayed-2/run.sqlite")));
   assert.equal(readFileSync(model, "utf8"), first);

@@ -28,7 +28,7 @@ pub struct Place<'p> {
     pub special: Option<(Kind, usize)>,
 }
 
-/// What to compute from a point.
+/// Computation from a point.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// A branch in another parameter.
