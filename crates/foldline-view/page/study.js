@@ -110,7 +110,7 @@ export class Desk {
     this.editor.set(found.text, found.lines);
     const [first, last] = found.lines;
     const lines = first === last ? `line ${first}` : `lines ${first} to ${last}`;
-    this.say(`New: ${lines}. Change them if you like, then Compute.`);
+    this.say(`New: ${lines}. Change what you like, then Compute.`);
     this.heard.tell(`${found.name}: ${lines} added to the study, not yet computed.`);
   }
 
