@@ -168,6 +168,7 @@ class App {
   drafted() {
     this.diagram.chart.empty.textContent = "Nothing is computed yet. Compute runs the study.";
     this.notes.open("model");
+    this.desk.drafted();
     const { about } = this.run;
     if (about.examples?.length > 0) {
       const show = () => showExamples(this.run, (text) => this.tell(text));

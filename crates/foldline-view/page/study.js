@@ -39,8 +39,8 @@ export class Desk {
     this.rows = [buttons(), buttons()];
     const panel = (row, editor) => make("div", { class: "desk" }, make("div", { class: "controls" }, ...Object.values(row)), editor.element);
     this.panels = { study: panel(this.rows[0], this.editor), model: panel(this.rows[1], this.modelEditor) };
-    this.modelEditor.set(this.model);
-    this.editor.set(this.base);
+    this.modelEditor.set(this.model, null, true);
+    this.editor.set(this.base, null, true);
     this.show();
   }
 
@@ -59,6 +59,11 @@ export class Desk {
   /** True if nothing that was computed can be kept. */
   get fresh() {
     return this.run.state.draft === true || this.modelChanged || this.editor.unfit !== null;
+  }
+
+  /** Checks a first study, which nothing has read yet. */
+  drafted() {
+    this.editor.check();
   }
 
   /** The run has another text by now. */
