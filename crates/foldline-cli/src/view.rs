@@ -182,8 +182,8 @@ fn opened(folder: &Path, child: &mut Child) -> Result<Watch, Failure> {
 
 /// Serves until Ctrl-C.
 fn served(watch: Watch, desk: Option<Desk>, folder: &Path, typed: &Typed) -> Result<Outcome, Failure> {
-    let server =
-        Server::new(watch, desk.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
+    let server = Server::new(watch, desk.clone())
+        .map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
     let address = server.address();
     writeln!(stdout(), "{address}")?;
     stdout().flush()?;

@@ -168,6 +168,7 @@ class App {
   drafted() {
     this.diagram.chart.empty.textContent = "Nothing is computed yet. Compute runs the study.";
     this.notes.open("model");
+    this.desk.drafted();
     const { about } = this.run;
     if (about.examples?.length > 0) {
       const show = () => showExamples(this.run, (text) => this.tell(text));
@@ -207,12 +208,12 @@ class App {
     const { state, source: from } = this.run;
     const points = [...this.run.branches.values()].reduce((sum, branch) => sum + branch.length, 0);
     const element = byId("progress");
-    const short = state.shortfalls.length > 0 || state.branches.some((own) => own.ends.some((end) => end && !end.complete));
+    const [done, of] = state.requests ?? [0, 0];
+    const short = done < of || state.shortfalls.length > 0 || state.branches.some((own) => own.ends.some((end) => end && !end.complete));
     const said = !from.live ? "saved page" : state.draft ? "not computed" : !this.connected ? "no connection: foldline view has ended" : state.running ? "running" : state.code === null || state.code === 0 ? "complete" : state.code === 3 ? "incomplete" : "stopped";
     const now = said === "complete" && short ? "incomplete" : said;
     element.className = now === "running" ? "running" : ["incomplete", "stopped"].includes(now) || !this.connected ? "short" : "";
     // Branches, curves, surveys and sweeps of the study; how long each takes is not known beforehand.
-    const [done, of] = state.requests ?? [0, 0];
     const part = now === "running" && of > 1 ? ` · ${done} of ${of} done` : "";
     const text = `${now}${part} · ${points} points · ${state.special.length} special`;
     if (element.textContent !== text) element.textContent = text;

@@ -39,8 +39,8 @@ export class Desk {
     this.rows = [buttons(), buttons()];
     const panel = (row, editor) => make("div", { class: "desk" }, make("div", { class: "controls" }, ...Object.values(row)), editor.element);
     this.panels = { study: panel(this.rows[0], this.editor), model: panel(this.rows[1], this.modelEditor) };
-    this.modelEditor.set(this.model);
-    this.editor.set(this.base);
+    this.modelEditor.set(this.model, null, true);
+    this.editor.set(this.base, null, true);
     this.show();
   }
 
@@ -59,6 +59,11 @@ export class Desk {
   /** True if nothing that was computed can be kept. */
   get fresh() {
     return this.run.state.draft === true || this.modelChanged || this.editor.unfit !== null;
+  }
+
+  /** Checks a first study, which nothing has read yet. */
+  drafted() {
+    this.editor.check();
   }
 
   /** The run has another text by now. */
@@ -81,7 +86,7 @@ export class Desk {
       : this.busy || !this.changed || mistaken || draft || !this.fresh ? this.said
       : "Nothing computed so far fits: this starts a run in a new folder and keeps the one shown.";
     for (const { go, drop, undo, note } of this.rows) {
-      go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute anew" : shorter ? "Remove" : "Compute";
+      go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute again" : shorter ? "Remove" : "Compute";
       go.disabled = (!this.changed && !draft) || this.busy || this.fixed !== null || mistaken || !checked;
       go.classList.toggle("first", !go.disabled);
       drop.disabled = !this.changed || this.busy;
@@ -110,7 +115,7 @@ export class Desk {
     this.editor.set(found.text, found.lines);
     const [first, last] = found.lines;
     const lines = first === last ? `line ${first}` : `lines ${first} to ${last}`;
-    this.say(`New: ${lines}. Change them if you like, then Compute.`);
+    this.say(`New: ${lines}. Change what you like, then Compute.`);
     this.heard.tell(`${found.name}: ${lines} added to the study, not yet computed.`);
   }
 

@@ -48,7 +48,7 @@ impl From<io::Error> for Refused {
 #[derive(Clone)]
 pub struct Desk(Arc<Inner>);
 
-/// Where study, model and run are.
+/// Files of a run.
 #[derive(Clone, Debug)]
 pub struct Files {
     /// The study file.
@@ -64,7 +64,7 @@ pub struct Files {
 pub struct Example {
     /// Its name, also that of its folder.
     pub name: String,
-    /// What it is about.
+    /// Its subject, in a sentence.
     pub about: String,
     /// Text of the model.
     pub model: String,
@@ -129,11 +129,8 @@ impl Desk {
         let _turn = self.turn();
         let own = self.0.examples.get(index).ok_or_else(|| "there is no such example".to_string())?;
         let folder = PathBuf::from(&own.name);
-        let files = Files {
-            study: folder.join("study.toml"),
-            model: folder.join("model.toml"),
-            folder: folder.join("run"),
-        };
+        let files =
+            Files { study: folder.join("study.toml"), model: folder.join("model.toml"), folder: folder.join("run") };
         let (study, model) = (files.study.display().to_string(), files.model.display().to_string());
         let study = parse_study(&own.study, &study, &own.model, &model).map_err(Refused::Mistakes)?;
         if let Some(there) = [&files.study, &files.model, &files.folder].into_iter().find(|file| file.exists()) {

@@ -77,9 +77,7 @@ fn bad(why: &str) -> (StatusCode, Value) {
 }
 
 fn mistakes(found: &[Diagnostic]) -> Vec<Value> {
-    let one = |own: &Diagnostic| {
-        json!({ "line": own.line, "column": own.column, "length": own.length, "message": own.message, "hint": own.hint })
-    };
+    let one = |own: &Diagnostic| json!({ "line": own.line, "column": own.column, "length": own.length, "message": own.message, "hint": own.hint });
     found.iter().map(one).collect()
 }
 

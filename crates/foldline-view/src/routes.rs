@@ -191,7 +191,9 @@ impl Routes {
             while !ended.load(Ordering::Relaxed) {
                 let start = Instant::now();
                 // A file that cannot be read at the moment is read later; the page keeps what it has.
-                if watch.look().unwrap_or(false) {
+                let _ = watch.look();
+                // The desk looks too, and may have seen the change first.
+                if *notices.borrow() != watch.notice() {
                     notices.send_replace(watch.notice());
                 }
                 let shortest = if watch.notice().running { LOOKS[0] } else { LOOKS[1] };

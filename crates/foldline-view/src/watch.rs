@@ -86,6 +86,9 @@ struct Growing {
 const NOTHING: &str = "{\"branches\":[],\"special\":[],\"notes\":[],\"responses\":[],\"shortfalls\":[],\
     \"running\":false,\"code\":null,\"points\":0,\"draft\":true}";
 
+/// Name of a branch, a point of it and, for a special point, its kind and number.
+type Placed = (String, Point, Option<(Kind, usize)>);
+
 /// Time and size of the file and of its log.
 type Stamp = [Option<(SystemTime, u64)>; 2];
 
@@ -297,6 +300,11 @@ impl Watch {
         }
         let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k).copied()).collect();
         let mut found = vec![Vec::new(); 3 + quantities.len()];
+        if wanted.is_empty() {
+            // There may be no file yet.
+            let header = json!({ "epoch": now, "columns": columns, "rows": 0, "next": since, "more": false });
+            return Ok(frame(&header, &found));
+        }
         let reading = Reading::open(&self.folder())?;
         for Stretch { branch, reach, .. } in &wanted {
             let before = found[0].len() as u64;
@@ -337,7 +345,7 @@ impl Watch {
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub(crate) fn place(&self, branch: i64, place: Place) -> Result<Option<(String, Point, Option<(Kind, usize)>)>, RunFileError> {
+    pub(crate) fn place(&self, branch: i64, place: Place) -> Result<Option<Placed>, RunFileError> {
         let reading = Reading::open(&self.folder())?;
         let Some(span) = reading.spans()?.into_iter().find(|span| span.number == branch) else { return Ok(None) };
         match place {

@@ -109,7 +109,11 @@ fn orders_of_other_pages_are_refused() {
         }
     }
     for path in ["/", "/api/run", "/api/points", "/app.js", "/api/study/", "//api/study"] {
-        assert_eq!(place.served.ask(&format!("POST {path} HTTP/1.1"), &[&host, &cookie, &origin, json]).0, 405, "{path}");
+        assert_eq!(
+            place.served.ask(&format!("POST {path} HTTP/1.1"), &[&host, &cookie, &origin, json]).0,
+            405,
+            "{path}"
+        );
     }
     let token = format!("POST /api/stop?token={} HTTP/1.1", place.served.token);
     assert_eq!(place.served.ask(&token, &[&host, &origin, json, "Content-Length: 0"]).0, 403);
@@ -120,14 +124,16 @@ fn orders_of_other_pages_are_refused() {
 fn bodies_that_mean_nothing_are_refused() {
     let place = Place::new();
     let deep = "[".repeat(100_000);
-    let bodies: [&[u8]; 8] = [b"", b"{", b"null", b"[]", b"\xff\xfe", b"{\"study\":1}", deep.as_bytes(), b"{\"branch\":1e400}"];
+    let bodies: [&[u8]; 8] =
+        [b"", b"{", b"null", b"[]", b"\xff\xfe", b"{\"study\":1}", deep.as_bytes(), b"{\"branch\":1e400}"];
     for what in ["check", "act", "study"] {
         for body in bodies {
             let (status, _) = place.raw(what, body);
             assert_eq!(status, 400, "{what} {:?}", String::from_utf8_lossy(&body[..body.len().min(40)]));
         }
     }
-    let odd = [json!("1"), json!(1.5), json!(-1), json!(u64::MAX), json!(null), json!({}), json!("1; DROP TABLE points")];
+    let odd =
+        [json!("1"), json!(1.5), json!(-1), json!(u64::MAX), json!(null), json!({}), json!("1; DROP TABLE points")];
     for value in &odd {
         for key in ["branch", "position", "special", "action", "free"] {
             let mut body = json!({ "branch": 1, "position": 0, "action": "continue", "free": "mu" });

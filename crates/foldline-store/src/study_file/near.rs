@@ -52,7 +52,8 @@ fn branch(
     let ends = || std::iter::once(name.len()).chain(name.rmatch_indices('/').map(|(end, _)| end));
     if let Some((known, steps)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
         let Start::EndOf(index) = known.start else {
-            let message = format!("\"{}\" is {}, and has no points inside", known.name, with_article(noun(&known.start)));
+            let message =
+                format!("\"{}\" is {}, and has no points inside", known.name, with_article(noun(&known.start)));
             walk.report(value.span(), message, format!("write `from = \"{}\"`, or name a branch", known.name));
             return None;
         };

@@ -123,14 +123,14 @@ test("a sweep starts from an unstable point, and mistakes are shown where they a
   await own.fill("#log textarea", right.replace('free = "Omega"\nrange = [0.5', 'free = "Omgea"\nrange = [0.5'));
   const mistake = own.locator("#log .mistakes li").first();
   await mistake.waitFor();
-  assert.match(await mistake.innerText(), /^14:8[\s\S]*no parameter `Omgea`/);
+  assert.match(await mistake.innerText(), /^13:8[\s\S]*no parameter `Omgea`/);
   assert.ok(await own.locator('#log button:text-is("Compute")').isDisabled());
   await mistake.locator("button").click();
   const line = await own.evaluate(() => {
     const { area } = window.foldline.app.desk.editor;
     return area.value.slice(0, area.selectionStart).split("\n").length;
   });
-  assert.equal(line, 14);
+  assert.equal(line, 13);
   await own.fill("#log textarea", right);
   await press(own, "Compute");
   await own.waitForFunction(() => window.foldline.app.run.state.responses.length === 1);
@@ -187,7 +187,7 @@ test("a model is edited and computed beside its diagram, each time in a new fold
   assert.ok(existsSync(join(folder, "decayed/run.sqlite")));
   await own.click('#log-tabs button:text-is("Model")');
   await own.fill("#log textarea", first);
-  await press(own, "Compute anew");
+  await press(own, "Compute again");
   await own.waitForFunction(() => window.foldline?.app.ready && window.foldline.app.run.about.folder.endsWith("decayed-2") && window.foldline.app.run.listed().some((branch) => branch.length > 3));
   assert.ok(existsSync(join(folder, "decayed/run.sqlite")) && existsSync(join(folder, "decayed-2/run.sqlite")));
   assert.equal(readFileSync(model, "utf8"), first);

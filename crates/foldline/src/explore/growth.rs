@@ -989,10 +989,7 @@ fn significant(value: f64) -> String {
 
 /// True if a branch continues on both sides of its start, which is then not a special point of another one.
 fn starts_inside(branch: &Branch) -> bool {
-    let inside = matches!(
-        branch.origin,
-        Origin::Seed(_) | Origin::EndOf(_) | Origin::Switch { kind: Kind::Mark, .. }
-    );
+    let inside = matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_) | Origin::Switch { kind: Kind::Mark, .. });
     branch.held.is_some() || inside
 }
 

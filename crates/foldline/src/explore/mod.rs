@@ -79,8 +79,8 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
-    SweepPlan, Switching,
+    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource, Start,
+    SurveyPlan, SweepPlan, Switching,
 };
 pub use seeds::{attractors, first_solution};
 pub use sizes::{scales_from, state_scales};

@@ -45,9 +45,9 @@ pub fn point_of(
         });
         own.fold(0.0, f64::max)
     };
-    let closest = points().min_by(|a, b| off(a).total_cmp(&off(b))).ok_or_else(|| {
-        format!("the branch {} has no points", branch.name)
-    })?;
+    let closest = points()
+        .min_by(|a, b| off(a).total_cmp(&off(b)))
+        .ok_or_else(|| format!("the branch {} has no points", branch.name))?;
     let whole = match closest.is_light() {
         true => observer.recall(branch, closest.position).filter(|point| !point.is_light()),
         false => Some(closest.clone()),

@@ -4,10 +4,10 @@
 //! shared as a whole. Results completed by an earlier run are not computed again. Jumps of a sweep are detected by
 //! solving for its motions (`pursuit`).
 
-use super::{System, near};
 use super::plan::{Plan, Start, SurveyPlan, SweepPlan};
 use super::pursuit::Pursuit;
 use super::seeds::{Seeds, sampling};
+use super::{System, near};
 use crate::attractors::{Candidate, Trial, stepped_sweep, survey_by_simulation};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Motion, Point, Response, Responses, Search, Solution};

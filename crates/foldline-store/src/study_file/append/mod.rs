@@ -28,7 +28,7 @@ pub struct Place<'p> {
     pub special: Option<(Kind, usize)>,
 }
 
-/// What to compute from a point.
+/// Computation from a point.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// A branch in another parameter.
@@ -134,7 +134,8 @@ fn block(study: &Study, place: &Place, action: &Action) -> Result<(String, Strin
             let index = parameter(free)?;
             let name = unused(study, &format!("{} in {free}", spoken(branch)));
             let range = around(*values.get(index).unwrap_or(&0.0));
-            let lines = format!("[[branch]]\nname = {}\nfrom = {from}\nfree = {}\nrange = {range}\n", text(&name), text(free));
+            let lines =
+                format!("[[branch]]\nname = {}\nfrom = {from}\nfree = {}\nrange = {range}\n", text(&name), text(free));
             Ok((name, lines))
         }
         Action::Follow { free } => {
@@ -158,8 +159,11 @@ fn block(study: &Study, place: &Place, action: &Action) -> Result<(String, Strin
             let (free, value) = (&model.parameters[plan.free].name, *values.get(plan.free).unwrap_or(&0.0));
             let name = unused(study, &format!("from {}", spoken(branch)));
             let value = number(value, DIGITS);
-            let lines =
-                format!("[[sweep]]\nname = {}\nfrom = {from}\nfree = {}\nvalues = [{value}]\n", text(&name), text(free));
+            let lines = format!(
+                "[[sweep]]\nname = {}\nfrom = {from}\nfree = {}\nvalues = [{value}]\n",
+                text(&name),
+                text(free)
+            );
             Ok((name, lines))
         }
         Action::Sweep { up } => {

@@ -17,7 +17,10 @@ pub(super) fn switched(study: &Study, place: &Place) -> Result<Appended, String>
     let steps: Vec<(Kind, usize)> = place.branch[plan.name.len()..]
         .split('/')
         .skip(1)
-        .map(|step| branches::switch_step(step).ok_or_else(|| format!("{} is one of several branches that leave at one point", place.branch)))
+        .map(|step| {
+            branches::switch_step(step)
+                .ok_or_else(|| format!("{} is one of several branches that leave at one point", place.branch))
+        })
         .collect::<Result<_, _>>()?;
     let (entry, depth) = entry(&plan.switching, &steps, kind, number)?;
     let name = format!("{}/{}-{number}", place.branch, kind.name());
@@ -70,7 +73,8 @@ fn inserted(text: &str, branch: &str, key: &str, depth: usize) -> Result<(String
     let span = switch.span();
     if text[span.clone()].starts_with('{') && text[span.clone()].ends_with('}') {
         let inner = text[span.start + 1..span.end - 1].trim();
-        let new = if inner.is_empty() { format!("{{ {key} = {depth} }}") } else { format!("{{ {inner}, {key} = {depth} }}") };
+        let new =
+            if inner.is_empty() { format!("{{ {key} = {depth} }}") } else { format!("{{ {inner}, {key} = {depth} }}") };
         return Ok(edit(span, &new));
     }
     let last = entries.iter().map(|(_, value)| value.span().end).max();
