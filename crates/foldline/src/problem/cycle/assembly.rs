@@ -74,13 +74,24 @@ impl CycleProblem<'_> {
     /// # Errors
     /// [`Singular`] if the block of an interval is.
     pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
-        let (lanes, size) = (self.lanes(), self.profile_size());
+        self.linearise(u);
+        self.assemble(u, rows)
+    }
+
+    /// Evaluates f and its derivatives at `u`.
+    pub(super) fn linearise(&mut self, u: &[f64]) {
         self.lay_phase();
         self.gather(u);
-        let known = self.setting.at(&u[size + 1..]);
-        let parameters = Parameters::Shared(&known);
+        let known = self.setting.at(&u[self.profile_size() + 1..]);
+        let (lanes, parameters) = (self.lanes(), Parameters::Shared(&known));
         let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
+    }
+
+    /// [`CycleProblem::fill`] after [`CycleProblem::linearise`].
+    pub(super) fn assemble(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        let (lanes, size) = (self.lanes(), self.profile_size());
+        let known = self.setting.at(&u[size + 1..]);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
             // Couplings are never removed, so that the order of elimination rarely changes.
             *coupled |= !vanishes(entry);

@@ -3,7 +3,7 @@
 use super::CycleProblem;
 use crate::contract::ZeroProblem;
 use crate::diagram::Mesh;
-use crate::model::{Definition, Model, ModelSource, Parameter, State};
+use crate::model::{Definition, Forcing, Model, ModelSource, Parameter, State};
 use crate::problem::{Axis, Setting};
 
 /// A damped chain with a self-excited first mass, and a force of its own on the last one.
@@ -32,6 +32,7 @@ fn chain(masses: usize, force: &str, full: bool) -> Model {
         parameters: vec![Parameter::new("p", 0.4), Parameter::new("w", 1.0)],
         states,
         equations,
+        forcing: Some(Forcing { is_frequency: true, expression: "w".into() }),
         ..ModelSource::default()
     })
     .unwrap()
