@@ -18,7 +18,7 @@ fn chain(masses: usize, force: &str, full: bool) -> Model {
         let right = if i + 1 == masses { "0".to_string() } else { format!("x{}", i + 1) };
         let own = match i {
             0 => "+ (p - x0^2)*v0 + 0.3*cos(w*t)".to_string(),
-            _ if i + 1 == masses => format!("- {}", force.replace('x', &format!("x{i}"))),
+            _ if i + 1 == masses => format!("- {}", force.replace('q', &format!("x{i}"))),
             _ => String::new(),
         };
         let stiffness = 4.0 + 0.1 * i as f64;
@@ -88,7 +88,7 @@ fn both(masses: usize, force: &str, count: usize) -> [(Vec<f64>, Vec<f64>, Vec<f
 
 #[test]
 fn local_forces_give_the_newton_step_and_the_multipliers_of_the_general_system() {
-    for force in ["0.5*x^3", "20*max(x - 0.2, 0)"] {
+    for force in ["0.5*q^3", "20*max(q - 0.2, 0)"] {
         let [(x, moduli, error), (own, own_moduli, own_error)] = both(20, force, 24);
         let size = crate::linalg::max_abs(&x);
         let apart = x.iter().zip(&own).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -110,7 +110,7 @@ fn ratio_of_general_to_local_factorisations() {
     for masses in [32, 60, 120] {
         let n = 2 * masses;
         let count = 40;
-        let (model, scales) = (chain(masses, "0.5*x^3", true), vec![1.0; n]);
+        let (model, scales) = (chain(masses, "0.5*q^3", true), vec![1.0; n]);
         let mesh: Mesh = (0..=count).map(|j| j as f64 / count as f64).collect();
         let times = [false, true].map(|structured| {
             let setting =
