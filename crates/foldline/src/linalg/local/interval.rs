@@ -14,7 +14,7 @@ pub struct Weights<'a> {
     pub end: &'a [f64],
 }
 
-/// What all intervals have in common.
+/// Modes and local forces, the same for all intervals.
 #[derive(Clone, Debug)]
 pub struct Common {
     /// Modes of the linear part.

@@ -69,17 +69,22 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// Linearises at `u`, fills the blocks and condenses them. Returns the intervals in which the orbit switches.
+    /// Evaluates f and its derivatives at `u`.
+    pub(super) fn linearise(&mut self, u: &[f64]) {
+        self.gather(u);
+        let known = self.setting.at(&u[self.profile_size() + 1..]);
+        let (lanes, parameters) = (self.lanes(), Parameters::Shared(&known));
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
+        self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
+    }
+
+    /// Fills the blocks after [`CycleProblem::linearise`] and condenses them, each while it is in the cache. Returns the
+    /// intervals in which the orbit switches.
     ///
     /// # Errors
     /// [`Singular`] if the block of an interval is.
     pub(super) fn condense_all(&mut self, u: &[f64]) -> Result<Arc<Vec<Switched>>, Singular> {
         let (lanes, size) = (self.lanes(), self.profile_size());
-        self.gather(u);
-        let known = self.setting.at(&u[size + 1..]);
-        let parameters = Parameters::Shared(&known);
-        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
-        self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
             // Couplings are never removed, so that the order of elimination rarely changes.
             *coupled |= !vanishes(entry);
@@ -105,12 +110,17 @@ impl CycleProblem<'_> {
         Ok(switched)
     }
 
-    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache. The `rows` act through
-    /// [`crate::contract::ZeroProblem::dot`].
+    /// The matrix at `u`, condensed. The `rows` act through [`crate::contract::ZeroProblem::dot`].
     ///
     /// # Errors
     /// [`Singular`] if the block of an interval is.
     pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        self.linearise(u);
+        self.assemble(u, rows)
+    }
+
+    /// [`CycleProblem::fill`] after [`CycleProblem::linearise`].
+    pub(super) fn assemble(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         let size = self.profile_size();
         self.lay_phase();
         let switched = self.condense_all(u)?;

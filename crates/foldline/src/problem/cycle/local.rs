@@ -185,24 +185,13 @@ impl CycleProblem<'_> {
         self.local.is_some()
     }
 
-    /// Factorises at `u` with local forces; `None` if the field does not have this structure or the result would not be
+    /// Factorises with local forces at `u`, where f is linearised; `None` if the field does not have this structure or the result would not be
     /// accurate.
     pub(super) fn localised(&mut self, u: &[f64], rows: &[f64]) -> Option<Localised> {
         if !self.structured || self.n < MANY || self.width != 1 || self.is_open() {
             return None;
         }
         let (lanes, size, n, m) = (self.lanes(), self.profile_size(), self.n, self.scheme.degree);
-        self.lay_phase();
-        self.gather(u);
-        let known = self.setting.at(&u[size + 1..]);
-        let batch = Batch {
-            lanes,
-            states: &self.states,
-            parameters: Parameters::Shared(&known),
-            times: &self.times,
-            signs: &[],
-        };
-        self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         let (structure, slopes) = Structure::of(&self.fx, lanes, &self.scale)?;
         let common = structure.common()?;
         let switched = self.switched(u);

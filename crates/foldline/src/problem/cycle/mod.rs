@@ -619,11 +619,12 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        self.linearise(u);
         self.local = self.localised(u, rows);
         if self.local.is_some() {
             return Ok(());
         }
-        self.fill(u, rows)?;
+        self.assemble(u, rows)?;
         self.system.eliminate(1.0)
     }
 

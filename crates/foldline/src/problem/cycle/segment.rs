@@ -75,6 +75,7 @@ impl<'a> CycleProblem<'a> {
         scale: &[f64],
     ) -> Result<f64, Singular> {
         self.scale.copy_from_slice(scale);
+        self.linearise(u);
         self.condense_all(u)?;
         either!(&mut self.system, s => {
             s.border.fill(Default::default());
@@ -121,6 +122,7 @@ impl CycleProblem<'_> {
     /// Transition matrices `[N][n × n]` and dependence of inner nodes on the left ends `[m][n × n][N]` along a cycle, with n
     /// and m; `None` if the equations cannot be condensed.
     pub(in crate::problem) fn transports_at(&mut self, u: &[f64]) -> Option<(Vec<f64>, Vec<f64>)> {
+        self.linearise(u);
         self.condense_all(u).ok()?;
         let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
         let mut inner = vec![0.0; m * n * n * count];
