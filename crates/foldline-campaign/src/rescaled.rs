@@ -259,10 +259,6 @@ impl Units {
                 cycle.period /= self.time;
                 cycle.profile.iter_mut().zip(self.states.iter().cycle()).for_each(|(x, factor)| *x /= factor);
             }
-            Solution::Torus(torus) => {
-                torus.period /= self.time;
-                torus.profile.iter_mut().zip(self.states.iter().cycle()).for_each(|(x, factor)| *x /= factor);
-            }
         }
     }
 }

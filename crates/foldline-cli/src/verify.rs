@@ -4,7 +4,6 @@ use crate::arguments::{Format, Verify as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
 use crate::table::{self, Cell, Column, Style, Table};
-use foldline::contract::VectorField;
 use foldline::explore::System;
 use foldline::verify::{Check, Quantity, Verified, verify};
 use foldline_store::run_file::Part;

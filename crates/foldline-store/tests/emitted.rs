@@ -130,6 +130,7 @@ fn fate(arrival: &Arrival) -> Fate {
         Outcome::Undefined => Fate::Undefined,
         Outcome::StepTooSmall => Fate::StepTooSmall,
         Outcome::StepLimit => Fate::StepLimit,
+        Outcome::Chatter => panic!("models with events are not emitted"),
     }
 }
 

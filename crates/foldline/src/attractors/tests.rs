@@ -43,7 +43,6 @@ fn radii(solution: &Solution) -> [f64; 2] {
         Solution::Equilibrium(x) => x.clone(),
         Solution::Torus(torus) => torus.section(0.0),
         Solution::Cycle(cycle) => cycle.uniform(4000),
-        Solution::Torus(_) => panic!("no torus is sampled"),
     };
     let radius = states.chunks_exact(4).map(|x| x[0].hypot(x[1]));
     radius.fold([f64::MAX, f64::MIN], |[low, high], r| [r.min(low), r.max(high)])

@@ -620,6 +620,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.linearise(u);
+        self.lay_phase();
         self.local = self.localised(u, rows);
         if self.local.is_some() {
             return Ok(());
