@@ -8,8 +8,9 @@ use rusqlite::Row;
 use rusqlite::types::Value;
 
 /// Values of the named columns and the columns of a point, in the order of the insertion. `extra` numbers are stored
-/// with the scalars.
-pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
+/// with the scalars; `named` is the number of named columns. A connecting orbit has further parameters, which are stored
+/// with the others but have no named columns.
+pub(super) fn values_of(point: &Point, extra: &[f64], named: usize) -> Vec<Value> {
     let count = |n: usize| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX));
     let (degree, profile) = match &point.solution {
         Solution::Equilibrium(state) => (Value::Null, state),
@@ -18,7 +19,8 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         Solution::Torus(torus) => (Value::Integer(-(torus.degree as i64)), &torus.profile),
     };
     let trust = &point.trust;
-    let shown = point.parameters.iter().chain(point.ranges.as_flattened());
+    let known = named.saturating_sub(2 * point.ranges.len());
+    let shown = point.parameters.iter().take(known).chain(point.ranges.as_flattened());
     let mut values: Vec<Value> = shown.map(|v| Value::Real(*v)).collect();
     let period = point.solution.period();
     let mut scalars = vec![
@@ -81,12 +83,12 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     values
 }
 
-pub(super) fn point_row(number: i64, point: &Point) -> Vec<Value> {
+pub(super) fn point_row(number: i64, point: &Point, named: usize) -> Vec<Value> {
     let first = [Value::Integer(number), Value::Integer(point.position)];
-    first.into_iter().chain(values_of(point, &[])).collect()
+    first.into_iter().chain(values_of(point, &[], named)).collect()
 }
 
-pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) -> Vec<Value> {
+pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint, named: usize) -> Vec<Value> {
     let (kind, position, key) = key_of(branch, special);
     let first = [
         Value::Integer(number),
@@ -101,7 +103,7 @@ pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) 
         Value::Text(special.remark.clone()),
     ];
     let extra = [&[special.error], &special.coefficients[..], &special.coefficient_errors[..]].concat();
-    first.into_iter().chain(values_of(&special.point, &extra)).collect()
+    first.into_iter().chain(values_of(&special.point, &extra, named)).collect()
 }
 
 pub(super) fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {

@@ -421,8 +421,10 @@ impl Observer for Recorder {
         };
         match event {
             Event::Begin(branch) => self.begin_branch(branch),
-            Event::Point(branch, point) => stored(branch, false, &|number| point_row(number, point)),
-            Event::Special(branch, special) => stored(branch, true, &|number| special_row(number, branch, special)),
+            Event::Point(branch, point) => stored(branch, false, &|number| point_row(number, point, self.shown)),
+            Event::Special(branch, special) => {
+                stored(branch, true, &|number| special_row(number, branch, special, self.shown))
+            }
             Event::SideEnded(branch, side, ending) => {
                 if let Some(number) = self.number(branch) {
                     let (sql, row) =

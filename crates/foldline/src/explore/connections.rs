@@ -368,7 +368,6 @@ impl Departure<'_> {
         const SHARE: f64 = 0.05;
         let time = |k: usize| self.times[0] + (self.times[1] - self.times[0]) * k as f64 / SAMPLES as f64;
         let all: Vec<[[f64; 2]; 2]> = (0..=SAMPLES).map(|k| self.parts(time(k))).collect();
-        let half = SAMPLES / 2;
         let size = |end: usize| {
             let lengths = || all.iter().map(move |own| own[end][0].hypot(own[end][1]));
             let (far, near) = (lengths().fold(0.0, f64::max), lengths().fold(f64::INFINITY, f64::min));
@@ -376,8 +375,8 @@ impl Departure<'_> {
             (size < 0.5 * far).then_some(size)
         };
         let sizes = [size(0)?, size(1)?];
-        let from = (0..half).find(|k| all[*k][0][1] >= sizes[0])?;
-        let to = (half..=SAMPLES).rev().find(|k| all[*k][1][0] >= sizes[1])?;
+        let from = (0..=SAMPLES).find(|k| all[*k][0][1] >= sizes[0])?;
+        let to = (from..=SAMPLES).rev().find(|k| all[*k][1][0] >= sizes[1])?;
         Some((time(from), time(to), sizes))
     }
 }

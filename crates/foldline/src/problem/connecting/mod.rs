@@ -23,7 +23,7 @@
 //! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
 //! in this order: T, x_0, x_1 if it is another equilibrium, ε_0, ε_1, g, e_0, e_1, Q_0, Q_1.
 //!
-//! The tangent spaces deviate from the manifolds by terms of second order, r = ½ P D²f[y, y] / (rates). They are the
+//! The tangent spaces deviate from the manifolds by nonlinear terms, r = P (f(x_i + y) - f(x_i) - A_i y) / (rates). They are the
 //! remainders of (3) and (4), from which the error of the truncated orbit follows.
 //!
 //! **Source.** beyn1990 (truncation, projection conditions, order of the error); kuznetsov2004, §6.
@@ -478,8 +478,11 @@ impl VectorField for ConnectingField<'_> {
         for (end, y) in self.deviations(ends, parameters).iter().enumerate() {
             let Some(split) = self.split(end, parameters) else { return vec![f64::NAN; self.conditions()[0]] };
             let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
-            let along: Vec<f64> = (0..n).map(|c| y[c] * self.scales[c]).chain(vec![0.0; self.known()]).collect();
-            let second = times(&self.turned(&at, parameters, &along), y);
+            let there: Vec<f64> = (0..n).map(|c| at.state[c] + y[c] * self.scales[c]).collect();
+            let beyond = self.saddle(&there, parameters, &[]).f;
+            // All that the linear flow neglects, of any order: the second may vanish by symmetry.
+            let linear = times(&at.a, y);
+            let neglected: Vec<f64> = (0..n).map(|c| beyond[c] - at.f[c] - linear[c]).collect();
             let values = eigenvalues(&at.a, n, &vec![1.0; n]);
             let rate = |sign: f64| {
                 let own = values.iter().map(|z| sign * z.re).filter(|x| *x > 0.0);
@@ -488,7 +491,7 @@ impl VectorField for ConnectingField<'_> {
             let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
             let rates = rate(gone) + 2.0 * rate(kept);
             let own = product(&parameters[ranges[end].clone()], &split.projector(gone), n);
-            all.extend(times(&own, &second).iter().map(|r| 0.5 * r / rates));
+            all.extend(times(&own, &neglected).iter().map(|r| r / rates));
             all.push(0.0);
         }
         all
