@@ -79,7 +79,6 @@ fn mark<'b>(branch: &'b Branch, index: usize, value: f64) -> &'b SpecialPoint {
 }
 
 #[test]
-#[ignore = "studies refuse branches of tori, which have not been compared with these values yet"]
 fn a_torus_leaves_the_entrained_motion_of_a_van_der_pol_oscillator() {
     let (study, diagram) = of(
         "van-der-pol-forced",
@@ -107,7 +106,6 @@ fn a_torus_leaves_the_entrained_motion_of_a_van_der_pol_oscillator() {
 }
 
 #[test]
-#[ignore = "studies refuse branches of tori, which have not been compared with these values yet"]
 fn a_horizontal_rotor_whirls_beyond_its_torus_point() {
     let (study, diagram) = of(
         "laval-rotor",
@@ -128,7 +126,6 @@ fn a_horizontal_rotor_whirls_beyond_its_torus_point() {
 }
 
 #[test]
-#[ignore = "studies refuse branches of tori, which have not been compared with these values yet"]
 fn an_autonomous_torus_has_two_free_frequencies() {
     let (study, diagram) = of(
         "langford",
@@ -152,7 +149,6 @@ fn an_autonomous_torus_has_two_free_frequencies() {
 }
 
 #[test]
-#[ignore = "studies refuse branches of tori, which have not been compared with these values yet"]
 fn gravity_makes_a_torus_of_a_bouncing_cycle() {
     let (study, diagram) = of(
         "overhung-rotor-gravity",
@@ -172,7 +168,6 @@ fn gravity_makes_a_torus_of_a_bouncing_cycle() {
 }
 
 #[test]
-#[ignore = "studies refuse branches of tori, which have not been compared with these values yet"]
 fn a_seed_on_which_the_forcing_acts_is_refused() {
     let (_, diagram) = of(
         "overhung-rotor-gravity",

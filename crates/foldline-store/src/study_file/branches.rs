@@ -30,7 +30,7 @@ pub(super) const KEYS: [&str; 13] = [
     "peaks",
     "max-points",
 ];
-const SWITCHABLE: [Kind; 3] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf];
+const SWITCHABLE: [Kind; 4] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf, Kind::Torus];
 
 /// Reads a branch and adds its plan to the items read so far.
 pub(super) fn read(

@@ -13,8 +13,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 9] =
-    ["name", "description", "attractor", "periods", "state", "cycle", "parameters", "samples", "random"];
+pub(super) const KEYS: [&str; 10] =
+    ["name", "description", "attractor", "periods", "state", "cycle", "torus", "parameters", "samples", "random"];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 
@@ -40,7 +40,10 @@ pub(super) fn read(
         if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {
             totals_of(walk, value, table.get("parameters"), model, state, &mut parameters);
         }
-        let source = lasting(walk, table, meant, model, &parameters);
+        let source = match table.get("torus").map(|value| (value, walk.boolean(value, "`torus`"))) {
+            Some((value, Some(true))) => of_torus(walk, value, meant, model),
+            _ => lasting(walk, table, meant, model, &parameters),
+        };
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
@@ -89,6 +92,21 @@ fn source(
         }
     };
     found.unwrap_or(fallback)
+}
+
+/// The torus that the cycle of a source is, while the forcing does not act.
+fn of_torus(walk: &mut Walk, value: &Value, source: SeedSource, model: &Model) -> SeedSource {
+    let message = match (&source, model) {
+        _ if model.iterated() => "tori of maps are not supported",
+        _ if model.conditions() != [0, 0] => "a boundary-value problem has no tori",
+        _ if !model.forced() => "`torus` belongs to models with a forcing, which begins to act on a cycle",
+        (SeedSource::Attractor(AttractorKey::Equilibrium), _) => {
+            "an equilibrium becomes a cycle under forcing, not a torus"
+        }
+        _ => return SeedSource::Torus(Box::new(source)),
+    };
+    walk.report(value.span(), message, "remove `torus`");
+    source
 }
 
 /// Applies `periods`, the number of forcing periods per cycle, if it is given.
