@@ -179,7 +179,7 @@ fn unsupported_features_are_explained() {
         ("noise = 0.1", &["random forcing"]),
         ("ntst = 40", &["meshes cannot be set", "`degree`"]),
         ("ds = 0.01", &["step sizes", "`tolerance`"]),
-        ("resets = 1", &["states that jump", "stiff force"]),
+        ("resets = 1", &["states that jump", "[events.NAME]", "[contact.NAME]"]),
     ];
     for (line, pieces) in expected {
         says(&study(line), pieces);

@@ -80,7 +80,7 @@ fn a_response_with_impacts_is_followed_to_its_grazings() {
 /// A second touch of the stop within the period.
 #[test]
 fn a_second_touch_is_located() {
-    let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.69, 1.1]\nmax_points = 400\n"));
+    let diagram = run(&oscillator(1.0, 0.8), &format!("{SEED}range = [0.69, 1.1]\nmax-points = 400\n"));
     located(diagram.branch("b").unwrap(), Kind::ImpactGrazing, TOUCHES, 1e-9);
 }
 

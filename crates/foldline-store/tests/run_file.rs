@@ -651,7 +651,8 @@ fn runs_that_cannot_be_resumed_are_rejected_with_reason_and_cure() {
     let exists = refusal(Recorder::create(folder.path(), &study()));
     assert!(exists.contains("already exists") && exists.contains("--resume"), "{exists}");
 
-    let other = Study { text: STUDY.replace("2]", "3]"), ..study() };
+    let text = STUDY.replace("2]", "3]");
+    let other = parse_study(&text, "study.toml", MODEL, "pitchfork.toml").expect("the study is right");
     let changed = refusal(Recorder::resume(folder.path(), &other));
     assert!(changed.contains("the study has changed") && changed.contains("--out"), "{changed}");
     let other = Study { model_text: MODEL.replace("2.0", "3.0"), ..study() };

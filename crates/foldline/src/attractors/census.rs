@@ -116,7 +116,9 @@ pub(super) fn survey(
         }
     }
     census.left += sampling.samples.saturating_sub(taken * block);
-    if block == Pace::BRIEF.block && !ended && !field.ended() {
+    // A lower limit was asked for.
+    let limited = sampling.limits.steps < STEP_LIMIT;
+    if block == Pace::BRIEF.block && !limited && !ended && !field.ended() {
         follow_one(&context, &starts, &mut reached, &mut census);
     }
     // Solutions that no sample reached count only if the survey ended early and none of their type was reached.

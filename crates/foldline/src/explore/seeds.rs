@@ -24,6 +24,7 @@ use crate::contract::{Event, Examination, Observer, Unobserved};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
+use crate::problem::mesh::LARGEST;
 use crate::special::impact::inadmissible;
 use std::sync::OnceLock;
 
@@ -354,8 +355,14 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
         let mut problem = problem_of(system, free, 4, &guess, false);
         Some(polished(&mut *problem, &settings, &guess).ok()?.point)
     };
-    let cycle = matches!(candidate, Candidate::Cycle { .. });
-    let found = solved(Spread::Arclength).or_else(|| if cycle { solved(Spread::Steps) } else { None })?;
+    let found = match candidate {
+        Candidate::Equilibrium(_) => solved(Spread::Arclength),
+        // Most trajectories end here; one that took so many steps may be a burst.
+        Candidate::Cycle { times, .. } if times.len() > 24 * LARGEST => {
+            solved(Spread::Arclength).or_else(|| solved(Spread::Turns))
+        }
+        Candidate::Cycle { .. } => solved(Spread::Arclength).or_else(|| solved(Spread::Steps)),
+    }?;
     let found = reduced(system, &settings, &found).unwrap_or(found);
     // A solution that ignores an event is no motion.
     Some(found).filter(|found| inadmissible(system.field, found).is_none())

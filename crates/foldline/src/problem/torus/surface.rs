@@ -15,6 +15,25 @@ use std::f64::consts::TAU;
 const ROUNDS: usize = 6;
 const FINER: f64 = 4.0;
 
+/// Number of local maxima of the grid that are improved: the highest of the grid may not be the highest hill.
+const HILLS: usize = 6;
+
+/// Places of the highest local maxima of a sign times values `[time][fine]`, the highest first.
+fn hills(line: &[f64], sign: f64, fine: usize) -> Vec<usize> {
+    let value = |at: usize| sign * line[at];
+    let higher = |at: usize| {
+        let (node, k) = (at / fine, at % fine);
+        let beside = [node * fine + (k + 1) % fine, node * fine + (k + fine - 1) % fine];
+        let in_time = [at.checked_sub(fine), Some(at + fine).filter(|next| *next < line.len())];
+        let neighbours = beside.into_iter().chain(in_time.into_iter().flatten());
+        neighbours.into_iter().all(|other| value(other) <= value(at))
+    };
+    let mut found: Vec<usize> = (0..line.len()).filter(|at| higher(*at)).collect();
+    found.sort_by(|a, b| value(*b).total_cmp(&value(*a)));
+    found.truncate(HILLS);
+    found
+}
+
 impl TorusProblem<'_> {
     /// Smallest and largest value, and mean and mean square, of every state, then of every output.
     pub(super) fn extent(&self, u: &[f64]) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
@@ -41,9 +60,11 @@ impl TorusProblem<'_> {
         let spacing = [1.0 / fine as f64, 0.5 / (self.intervals() * m) as f64];
         let ranges = all.chunks_exact(lanes).enumerate().map(|(channel, line)| {
             [-1.0, 1.0].map(|sign| {
-                let best = (0..lanes).max_by(|a, b| (sign * line[*a]).total_cmp(&(sign * line[*b]))).unwrap_or(0);
-                let place = [(best % fine) as f64 / fine as f64, times[best]];
-                sign * self.improved(u, &parameters, channel, sign, place, spacing)
+                let improved = hills(line, sign, fine).into_iter().map(|at| {
+                    let place = [(at % fine) as f64 / fine as f64, times[at]];
+                    self.improved(u, &parameters, channel, sign, place, spacing)
+                });
+                sign * improved.fold(f64::NEG_INFINITY, f64::max)
             })
         });
         let weight = |at: usize| {
