@@ -174,7 +174,7 @@ fn unsupported_features_are_explained() {
         ("map = true", &["study.toml:2:1", "[map] takes the place of [equations]", "next value"]),
         ("boundary-conditions = []", &["boundary-value problem", "[boundary]"]),
         ("delays = [1]", &["delay differential equations", "DDE-BIFTOOL"]),
-        ("torus = 1", &["invariant tori", "[[curve]]"]),
+        ("torus = 1", &["invariant tori", "switch = { torus = 1 }"]),
         ("homoclinic = 1", &["connecting orbits", "HomCont"]),
         ("noise = 0.1", &["random forcing"]),
         ("ntst = 40", &["meshes cannot be set", "`degree`"]),

@@ -48,9 +48,9 @@ const KINDS: [Kind; 15] = [
     ),
     (
         &["torus", "tori", "quasiperiodic", "invarianttorus"],
-        "invariant tori are not computed",
-        "torus bifurcations of cycles are located, and continued in two parameters with [[curve]]; motions on tori \
-         appear in a [[survey]] or [[sweep]]. To continue tori use COCO or CoSTAR",
+        "invariant tori are branches that leave cycles at torus points",
+        "write `switch = { torus = 1 }` in the [[branch]] of the cycles; where a small forcing acts on an autonomous cycle, \
+         give the [[seed]] of the cycle `torus = true` and follow the branch in the size of the forcing",
     ),
     (
         &["homoclinic", "heteroclinic", "connection", "connectingorbit", "homcont"],

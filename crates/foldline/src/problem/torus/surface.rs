@@ -64,7 +64,7 @@ impl TorusProblem<'_> {
                     let place = [(at % fine) as f64 / fine as f64, times[at]];
                     self.improved(u, &parameters, channel, sign, place, spacing)
                 });
-                sign * improved.fold(f64::NEG_INFINITY, f64::max)
+                sign * improved.fold(f64::NAN, f64::max)
             })
         });
         let weight = |at: usize| {
