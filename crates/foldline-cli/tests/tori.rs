@@ -82,7 +82,7 @@ fn mark<'b>(branch: &'b Branch, index: usize, value: f64) -> &'b SpecialPoint {
 fn a_torus_leaves_the_entrained_motion_of_a_van_der_pol_oscillator() {
     let (study, diagram) = of(
         "van-der-pol-forced",
-        "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { s = 1, Omega = 1.2 }\nsamples = 16\n\
+        "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { s = 1, Omega = 1.2 }\nsamples = 16\n\
          [[branch]]\nname = \"c\"\nfrom = \"s\"\nfree = \"s\"\nrange = [0.25, 1.2]\nswitch = { torus = 1 }\n\
          mark = { s = [0.3, 0.7, 0.74] }",
     );
@@ -109,7 +109,7 @@ fn a_torus_leaves_the_entrained_motion_of_a_van_der_pol_oscillator() {
 fn a_horizontal_rotor_whirls_beyond_its_torus_point() {
     let (study, diagram) = of(
         "laval-rotor",
-        "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { eta = 1.6 }\nsamples = 8\n\
+        "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { eta = 1.6 }\nsamples = 8\n\
          [[branch]]\nname = \"c\"\nfrom = \"s\"\nfree = \"eta\"\nrange = [1.55, 1.92]\nswitch = { torus = 1 }\n\
          mark = { eta = [1.75, 1.9] }",
     );
@@ -129,7 +129,7 @@ fn a_horizontal_rotor_whirls_beyond_its_torus_point() {
 fn an_autonomous_torus_has_two_free_frequencies() {
     let (study, diagram) = of(
         "langford",
-        "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { rho = 0.7 }\nsamples = 8\n\
+        "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { rho = 0.7 }\nsamples = 8\n\
          [[branch]]\nname = \"c\"\nfrom = \"s\"\nfree = \"rho\"\nrange = [0.48, 0.8]\nswitch = { torus = 1 }\n\
          mark = { rho = [0.5, 0.6] }",
     );
@@ -152,7 +152,7 @@ fn an_autonomous_torus_has_two_free_frequencies() {
 fn gravity_makes_a_torus_of_a_bouncing_cycle() {
     let (study, diagram) = of(
         "overhung-rotor-gravity",
-        "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"2:1\"\ntorus = true\nparameters = { Omega = 5, G = 0 }\n\
+        "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"2:1\"\ntorus = true\nparameters = { Omega = 5, G = 0 }\n\
          [[branch]]\nname = \"t\"\nfrom = \"s\"\nfree = \"G\"\nuntil = 0.05",
     );
     let branch = diagram.branch("t").unwrap();

@@ -112,7 +112,8 @@ impl Split {
             }
             (low, high) = (high, 1.5 * high);
         }
-        if !(size(high) <= goal) {
+        let reached = size(high);
+        if reached.is_nan() || reached > goal {
             return None;
         }
         for _ in 0..HALVINGS {
