@@ -69,7 +69,7 @@ fn near(value: f64, known: f64, within: f64) {
 }
 
 #[track_caller]
-fn mark<'b>(branch: &'b Branch, index: usize, value: f64) -> &'b SpecialPoint {
+fn mark(branch: &Branch, index: usize, value: f64) -> &SpecialPoint {
     let there = |s: &&SpecialPoint| s.kind == Kind::Mark && (s.point.parameters[index] - value).abs() < 1e-9;
     branch
         .special
