@@ -196,7 +196,8 @@ impl Returns {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
         let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
-        if newest < q {
+        // m + 1 differences, and one more return for the comparison. A burst is long, and repeats itself at once.
+        if newest < if self.reach.is_empty() { (terms + 2) * q } else { q } {
             return None;
         }
         // y(0) is the newest return.
@@ -209,7 +210,6 @@ impl Returns {
         if size < self.noise {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
-        // m + 1 differences, and one more return for the comparison.
         if newest < (terms + 2) * q {
             return None;
         }
