@@ -14,6 +14,9 @@ use std::f64::consts::TAU;
 /// Rounds of improvement of a largest value; each divides the spacing by [`FINER`].
 const ROUNDS: usize = 6;
 const FINER: f64 = 4.0;
+/// Largest number of steps, and the longest of them in spacings.
+const STEPS: usize = 100;
+const FARTHEST: f64 = 2.0;
 
 /// Number of local maxima of the grid that are improved: the highest of the grid may not be the highest hill.
 const HILLS: usize = 6;
@@ -120,8 +123,8 @@ impl TorusProblem<'_> {
             let all = self.channels(self.state(u, at), &[at[1] - at[1].floor()], parameters);
             sign * all[channel]
         };
-        let mut best = value(place);
-        for _ in 0..ROUNDS {
+        let (mut best, mut rounds) = (value(place), 0);
+        for _ in 0..STEPS {
             let [h, k] = spacing;
             let at = |a: f64, b: f64| value([place[0] + a * h, place[1] + b * k]);
             let (right, left, up, down) = (at(1.0, 0.0), at(-1.0, 0.0), at(0.0, 1.0), at(0.0, -1.0));
@@ -133,13 +136,23 @@ impl TorusProblem<'_> {
                 true => [(mixed * gy - yy * gx) / det, (mixed * gx - xx * gy) / det],
                 false => [gx, gy].map(|g| if g == 0.0 { 0.0 } else { g.signum() }),
             };
-            let step = step.map(|s| s.clamp(-2.0, 2.0));
+            // A quantity that hardly depends on one of the frequencies has a ridge across the grid: the way along it is long.
+            let longest = step[0].abs().max(step[1].abs());
+            let step = step.map(|s| s * (FARTHEST / longest).min(1.0));
             let next = [place[0] + step[0] * h, place[1] + step[1] * k];
             let found = value(next);
-            if found > best {
+            let higher = found > best;
+            if higher {
                 (best, place) = (found, next);
             }
+            if higher && longest > FARTHEST {
+                continue;
+            }
             spacing = spacing.map(|s| s / FINER);
+            rounds += 1;
+            if rounds == ROUNDS {
+                break;
+            }
         }
         best
     }
