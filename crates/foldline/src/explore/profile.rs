@@ -37,7 +37,7 @@ pub(super) fn first_profile(
     // A cycle of many turns needs more intervals.
     let intervals = match spread {
         Spread::Arclength => (times.len() / 12).clamp(60, 1200),
-        Spread::Turns => (times.len() / 12).clamp(60, 2 * LARGEST),
+        Spread::Turns => (times.len() / 12).clamp(60, 4 * LARGEST),
         Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
     };
     let scheme = Scheme::new(4);
