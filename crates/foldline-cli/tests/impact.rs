@@ -5,7 +5,7 @@ use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 
-/// Numbers of `tests/reference/exact_impact.csv`: one impact per period with d = 1, in closed form.
+/// One impact per period with d = 1, in closed form: the flight is that of the linear oscillator.
 const FOLD: f64 = 1.750_142_623_676_7;
 const GRAZES: f64 = 1.410_673_597_966_6;
 const TOUCHES: f64 = 0.704_493_589_686;

@@ -1,4 +1,4 @@
-//! What the page may order, and nothing else does.
+//! Requests that change something: those that the page sends, and those that must be refused.
 
 mod common;
 
