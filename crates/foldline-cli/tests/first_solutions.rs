@@ -137,3 +137,17 @@ fn a_family_of_cycles_parametrised_by_energy_starts_from_a_given_cycle() {
     assert!((low - 12.1318908).abs() < 1e-5 && (high - 12.1318908).abs() < 1e-5, "{low} {high}");
     assert!(branch.points.iter().all(|point| point.parameters[0].abs() < 1e-9));
 }
+
+/// A Hindmarsh-Rose neuron with bursts of 39 spikes, each of which crosses any section of the fast motion. The period is that between bursts in an
+/// integration by LSODA at a relative tolerance of 1e-10.
+#[test]
+fn a_burst_of_many_spikes_is_found_by_sampling() {
+    let model = "[parameters]\nI = 2\nr = 2e-4\n[states]\nx = { equation = \"y - x^3 + 3*x^2 - z + I\", range = [-2, 2] }\n\
+                 y = { equation = \"1 - 5*x^2 - y\", range = [-10, 1] }\n\
+                 z = { equation = \"r*(4*(x + 1.6) - z)\", range = [1.5, 2.5] }\n";
+    let seed = "attractor = \"cycle\"\nsamples = 4";
+    let (diagram, notes) = run(model, seed, "free = \"I\"\nrange = [1.999, 2.001]\nmax-points = 1");
+    let start = diagram.branches[0].points.iter().find(|point| point.position == 0);
+    let period = start.and_then(|point| point.solution.period());
+    assert!(period.is_some_and(|period| (period - 1679.14941).abs() < 1e-4), "{period:?}: {notes}");
+}

@@ -181,12 +181,11 @@ impl Found<'_> {
     }
 
     /// Counts the equilibria at a parameter value by linear interpolation between points. Equilibria that differ only
-    /// in the signs of states, or by less than linear interpolation can tell, count once.
+    /// in the signs of states count once.
     fn solutions(&self, parameter: &str, value: f64) -> usize {
-        /// Relative difference below which equilibria are equal …
+        /// Relative difference below which equilibria are equal. Empirical: larger than the error of linear
+        /// interpolation.
         const SAME: f64 = 1e-3;
-        /// … or difference relative to the step: of a quarter of a radian, the chord leaves the arc by a thirtieth.
-        const CHORD: f64 = 0.03;
         let states = self.model.states.len();
         let at = |p: &Point| quantity(self.model, p, parameter).unwrap_or(f64::NAN) - value;
         let mut found: Vec<Vec<f64>> = Vec::new();
@@ -198,10 +197,8 @@ impl Found<'_> {
             let share = a / (a - b);
             let state = |k: usize| (1.0 - share) * pair[0].ranges[k][1] + share * pair[1].ranges[k][1];
             let size: Vec<f64> = (0..states).map(|k| state(k).abs()).collect();
-            let step = (0..states).map(|k| (pair[1].ranges[k][1] - pair[0].ranges[k][1]).abs()).fold(0.0, f64::max);
             let same = |known: &Vec<f64>| {
-                let near = |(a, b): (&f64, &f64)| (a - b).abs() <= SAME * (1.0 + a.abs().max(*b)) + CHORD * step;
-                known.iter().zip(&size).all(near)
+                known.iter().zip(&size).all(|(a, b)| (a - b).abs() <= SAME * (1.0 + a.abs().max(*b)))
             };
             if !found.iter().any(same) {
                 found.push(size);

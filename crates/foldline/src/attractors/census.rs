@@ -44,7 +44,7 @@ const ENOUGH: usize = 100;
 pub(super) const STEP_LIMIT: usize = 60_000;
 /// Least limit on the number of steps of a single trajectory: some ten bursts of a few hundred stiff spikes, a few
 /// seconds of a processor.
-pub(super) const PERSISTENT: usize = 1_000_000;
+pub(crate) const PERSISTENT: usize = 1_000_000;
 
 /// A solution and its hits.
 struct Reached {

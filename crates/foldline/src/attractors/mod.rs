@@ -45,6 +45,7 @@ use angles::Rolled;
 pub(crate) use angles::gained;
 pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
+pub(crate) use census::PERSISTENT;
 use census::Pace;
 use census::STEP_LIMIT;
 use runner::PATIENT;

@@ -183,21 +183,23 @@ impl Returns {
     }
 
     /// Returns the limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and
-    /// the limit predicted one return earlier was the same.
-    fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
+    /// the limit predicted one return earlier was the same. With `repeats`, a motion that is back where it was one period
+    /// earlier needs no more returns: bursts are long, and attract within one of them.
+    fn predict(&self, q: usize, extent: &[f64], repeats: bool) -> Option<Prediction> {
         // Smaller matrices where fewer terms suffice.
         match MOST_TERMS.min(self.anchor.len().saturating_sub(1)) {
-            ..=3 => self.predict_in::<5>(q, extent),
-            _ => self.predict_in::<MOST>(q, extent),
+            ..=3 => self.predict_in::<5>(q, extent, repeats),
+            _ => self.predict_in::<MOST>(q, extent, repeats),
         }
     }
 
-    fn predict_in<const M: usize>(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
+    fn predict_in<const M: usize>(&self, q: usize, extent: &[f64], repeats: bool) -> Option<Prediction> {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
         let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
-        // m + 1 differences, and one more return for the comparison. A burst is long, and repeats itself at once.
-        if newest < if self.reach.is_empty() { (terms + 2) * q } else { q } {
+        // m + 1 differences, and one more return for the comparison.
+        let enough = newest >= (terms + 2) * q;
+        if !enough && !(repeats && newest >= q) {
             return None;
         }
         // y(0) is the newest return.
@@ -210,7 +212,7 @@ impl Returns {
         if size < self.noise {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
-        if newest < (terms + 2) * q {
+        if !enough {
             return None;
         }
         let gram = Gram::<M>::new(terms + 2, extent, y);
@@ -268,7 +270,7 @@ impl Returns {
         const AS_WELL: f64 = 1e-4;
         let mut found: Vec<Prediction> = Vec::new();
         for q in 1..=MOST_CROSSINGS {
-            found.extend(self.predict(q, extent));
+            found.extend(self.predict(q, extent, !self.reach.is_empty()));
             // These remain and come first, whatever is found later.
             if found.len() >= count && found.iter().all(|p| p.doubt <= AS_WELL) {
                 break;
@@ -284,7 +286,7 @@ impl Returns {
     /// the fewest if several do. (A mean over the crossings of a period is also a steady prediction, but not a state of
     /// the motion.)
     pub(super) fn closest(&self, extent: &[f64]) -> Option<Prediction> {
-        let mut found: Vec<Prediction> = (1..=MOST_REPEATED).filter_map(|q| self.predict(q, extent)).collect();
+        let mut found: Vec<Prediction> = (1..=MOST_REPEATED).filter_map(|q| self.predict(q, extent, true)).collect();
         let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.size));
         found.retain(|p| p.size <= 10.0 * least + SAME);
         found.into_iter().next()

@@ -148,7 +148,11 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         *key != AttractorKey::Equilibrium && census.attractors.iter().all(|a| a.point.solution.period().is_none());
     let (stuck, unsettled) = (census.stuck > 0, (none || rest_only) && census.unsettled > 0);
     let exit = census.exits.first().filter(|_| none);
-    let why = of_no_start(system, &seed.parameters, Seen { state: None, stuck, all_escaped, exit, unsettled });
+    let why = of_no_start(
+        system,
+        &seed.parameters,
+        Seen { state: None, stuck, all_escaped, exit, unsettled, repeats: false },
+    );
     let unnamed = census.attractors.iter().any(|a| a.point.solution.period().is_some() && a.ratio.is_none());
     let single = match key {
         AttractorKey::Ratio(..) if unnamed && system.whirl.is_some() => {

@@ -5,11 +5,12 @@
 
 use super::direct::{transient, turn};
 use super::{System, symmetry};
-use crate::attractors::{Exit, Limits};
+use crate::attractors::{self, Exit, Limits};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Ending, Point, Shown};
 use crate::linalg::max_abs;
 use crate::model::{conserved_at, in_words, shifts};
+use crate::problem::mesh::LARGEST;
 use crate::special::connection::in_first_turn;
 
 /// Size, relative to the largest, below which the remainder of a column is rounding.
@@ -28,6 +29,8 @@ pub(super) struct Seen<'a> {
     pub exit: Option<&'a Exit>,
     /// True if some trajectories did not settle, or settled to a motion that Newton's method does not confirm.
     pub unsettled: bool,
+    /// True if the trajectory from the given state repeats itself, and Newton's method does not confirm that motion.
+    pub repeats: bool,
 }
 
 /// Returns lines with a likely cause and a cure, to be appended to a message about what happened.
@@ -74,6 +77,11 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
              cycle (docs/book/when-it-does-not-work.md)",
             angles.join(", ")
         ),
+        _ if seen.repeats => format!(
+            "\nlikely cause: the cycle needs a mesh of more than {LARGEST} intervals, as a burst of a hundred spikes does; or it \
+             is one of a family, or hardly attracts\nwhat to do: set a larger tolerance, change the parameters so that \
+             the cycle becomes simpler and follow it from there, or follow the attractor by simulation with [[sweep]]"
+        ),
         _ if seen.unsettled => {
             let rest = if system.field.switch_count() > 0 {
                 "rest on a surface at which f jumps (a sliding equilibrium, such as a mass that sticks, is not followed), "
@@ -84,7 +92,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
                 "\nlikely cause: a quasi-periodic or chaotic motion, {rest}or slow attraction: trajectories are limited to \
              {}\nwhat to do: raise the limit in the study, change the parameters or the ranges of the states, or \
              give a state",
-                limits(system)
+                limits(system, seen.state.is_some())
             )
         }
         _ => {
@@ -142,9 +150,11 @@ fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
     (0..n).filter(|&i| !declared(i) && is_angle(i)).map(|i| system.state_names[i].clone()).collect()
 }
 
-/// The limits on trajectories as text, with the names of the settings.
-fn limits(system: &System) -> String {
+/// The limits on trajectories as text, with the names of the settings; the trajectory from a `given` state is followed
+/// for longer.
+fn limits(system: &System, given: bool) -> String {
     let Limits { steps, time } = system.limits;
+    let steps = if given { steps.max(attractors::PERSISTENT) } else { steps };
     let steps = format!("{steps} integration steps (`max-steps`)");
     if time.is_finite() { format!("{steps} or a time of {time:e} (`max-time`)") } else { steps }
 }

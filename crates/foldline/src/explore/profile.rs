@@ -13,8 +13,6 @@ pub(super) enum Spread {
     /// The arclength. Layers get intervals in proportion to their extent; the end of a transient on a slow manifold
     /// gets few.
     Arclength,
-    /// The arclength, over more intervals than other meshes may have: for bursts of hundreds of spikes.
-    Turns,
     /// The steps of the integration, whose error control has resolved the ends of transients too.
     Steps,
 }
@@ -37,7 +35,6 @@ pub(super) fn first_profile(
     // A cycle of many turns needs more intervals.
     let intervals = match spread {
         Spread::Arclength => (times.len() / 12).clamp(60, 1200),
-        Spread::Turns => (times.len() / 12).clamp(60, 4 * LARGEST),
         Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
     };
     let scheme = Scheme::new(4);
@@ -48,7 +45,7 @@ pub(super) fn first_profile(
     for k in 1..times.len() {
         let moved: f64 = (0..n).map(|i| ((states[k * n + i] - states[(k - 1) * n + i]) / size[i]).powi(2)).sum();
         length.push(match spread {
-            Spread::Arclength | Spread::Turns => length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period,
+            Spread::Arclength => length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period,
             Spread::Steps => k as f64,
         });
     }

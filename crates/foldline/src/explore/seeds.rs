@@ -24,7 +24,6 @@ use crate::contract::{Event, Examination, Observer, Unobserved};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
-use crate::problem::mesh::LARGEST;
 use crate::special::impact::inadmissible;
 use std::sync::OnceLock;
 
@@ -355,14 +354,8 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
         let mut problem = problem_of(system, free, 4, &guess, false);
         Some(polished(&mut *problem, &settings, &guess).ok()?.point)
     };
-    let found = match candidate {
-        Candidate::Equilibrium(_) => solved(Spread::Arclength),
-        // Most trajectories end here; one that took so many steps may be a burst.
-        Candidate::Cycle { times, .. } if times.len() > 24 * LARGEST => {
-            solved(Spread::Arclength).or_else(|| solved(Spread::Turns))
-        }
-        Candidate::Cycle { .. } => solved(Spread::Arclength).or_else(|| solved(Spread::Steps)),
-    }?;
+    let cycle = matches!(candidate, Candidate::Cycle { .. });
+    let found = solved(Spread::Arclength).or_else(|| if cycle { solved(Spread::Steps) } else { None })?;
     let found = reduced(system, &settings, &found).unwrap_or(found);
     // A solution that ignores an event is no motion.
     Some(found).filter(|found| inadmissible(system.field, found).is_none())
@@ -500,7 +493,12 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
         _ => None,
     };
     let unsettled = matches!(lost, Lost::Unsettled { .. } | Lost::Unconfirmed { .. });
+    let repeats = matches!(lost, Lost::Unconfirmed { period, .. } if *period > 0.0);
     let (stuck, all_escaped) = (*lost == Lost::Stuck, *lost == Lost::Escaped);
-    let why = of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped, exit, unsettled });
+    let why = of_no_start(
+        system,
+        &seed.parameters,
+        Seen { state: Some(state), stuck, all_escaped, exit, unsettled, repeats },
+    );
     format!("the trajectory from the given state {what}{why}")
 }

@@ -56,7 +56,7 @@ pub fn denser(mesh: &Mesh) -> Mesh {
 }
 
 /// Mesh on which every interval would have an error of about `target`, nowhere coarser than the share `kept` of the
-/// density of `mesh`. `None` if more than [`LARGEST`] intervals were needed, or more than a larger `mesh` has.
+/// density of `mesh`. `None` if more than [`LARGEST`] intervals were needed.
 pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
     let count = errors.len();
     let power = 1.0 / (degree as f64 + 1.0);
@@ -79,7 +79,7 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, 
         })
         .collect();
     let total: f64 = (0..count).map(|j| density[j] * (mesh[j + 1] - mesh[j])).sum();
-    if !(total.is_finite() && total <= LARGEST.max(count) as f64) {
+    if !(total.is_finite() && total <= LARGEST as f64) {
         return None;
     }
     let wanted = (total.ceil() as usize).max(SMALLEST);
