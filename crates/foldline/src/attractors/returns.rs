@@ -199,7 +199,7 @@ impl Returns {
         let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
         // m + 1 differences, and one more return for the comparison.
         let enough = newest >= (terms + 2) * q;
-        if !enough && !(repeats && newest >= q) {
+        if !(enough || repeats && newest >= q) {
             return None;
         }
         // y(0) is the newest return.
