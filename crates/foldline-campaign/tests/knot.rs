@@ -64,7 +64,7 @@ fn sampled(system: &System, case: &Case, Place(omega, period, state): &Place) ->
         }
     }
     let cycle =
-        Cycle { period: *period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() };
+        Cycle { points: foldline::problem::gauss::Points::Gauss, period: *period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() };
     Point {
         position: 0,
         parameters,

@@ -7,7 +7,6 @@
 use foldline::contract::{Event, Observer, Unobserved, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Solution};
 use foldline::explore::{self, System, growth, known};
-use foldline::problem::gauss::Scheme;
 use foldline_store::study_file::{Study, parse_study, read_study};
 use std::path::Path;
 use std::sync::OnceLock;
@@ -225,7 +224,7 @@ fn synchronous_responses_satisfy_their_closed_form() {
 
 /// Averages over a cycle by Gauss quadrature: |U'|², u v' - v u', |U|², v.
 fn averages(cycle: &foldline::diagram::Cycle) -> [f64; 4] {
-    let scheme = Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     let mut sums = [0.0; 4];
     for (j, interval) in cycle.profile.chunks_exact(4 * (cycle.degree + 1)).enumerate() {
         let h = cycle.mesh[j + 1] - cycle.mesh[j];

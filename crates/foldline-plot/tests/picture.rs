@@ -17,6 +17,7 @@ fn model() -> Model {
 fn point(position: i64, omega: f64, r: f64, unstable: usize, cycle: bool) -> Point {
     let solution = match cycle {
         true => Solution::Cycle(Cycle {
+            points: foldline::problem::gauss::Points::Gauss,
             period: 6.0 / omega,
             forcing_periods: 0,
             mesh: vec![0.0, 1.0].into(),

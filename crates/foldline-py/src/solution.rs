@@ -127,7 +127,7 @@ impl Solution {
     /// Normalised times of the nodes of the profile, `[N (m + 1)]`.
     fn node_times<'py>(&self, py: Python<'py>) -> Array<'py> {
         let Some(cycle) = self.cycle() else { return numbers(py, [].into_iter()) };
-        let scheme = Scheme::new(cycle.degree);
+        let scheme = cycle.scheme();
         let nodes = &scheme.nodes[..=cycle.degree];
         let on = |pair: &[f64]| nodes.iter().map(|c| pair[0] + (pair[1] - pair[0]) * c).collect::<Vec<f64>>();
         numbers(py, cycle.mesh.windows(2).flat_map(on).collect::<Vec<f64>>().into_iter())

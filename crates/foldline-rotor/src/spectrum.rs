@@ -179,7 +179,7 @@ pub fn mean_square(cycle: &Cycle) -> f64 {
     if n < 2 {
         return 0.0;
     }
-    let scheme = foldline::problem::gauss::Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     // m Gauss points are exact up to degree 2m - 1, one short of the degree 2m of |z|²; one more point is exact.
     let finer = foldline::problem::gauss::Scheme::new(cycle.degree + 1);
     let weights: Vec<Vec<f64>> = finer.nodes[1..].iter().map(|&s| scheme.interpolation(s)).collect();

@@ -32,6 +32,7 @@ fn point(position: i64, cycle: bool) -> Point {
     let solution = if cycle {
         let mesh: Vec<f64> = vec![0.0, 1.0 / 3.0, 1.0];
         Solution::Cycle(Cycle {
+            points: foldline::problem::gauss::Points::Gauss,
             period: awkward(5),
             forcing_periods: 3,
             mesh: mesh.into(),

@@ -116,12 +116,12 @@ fn cycle(numbers: &[f64], n: usize, intervals: usize, degree: usize, period: f64
             profile.extend((0..n).map(value));
         }
     }
-    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree, profile, gain: Vec::new() }
+    Cycle { points: foldline::problem::gauss::Points::Gauss, period, forcing_periods: 0, mesh: mesh.into(), degree, profile, gain: Vec::new() }
 }
 
 /// Writes the file from which AUTO reads the first profile: times and states of a cycle, including both ends.
 pub fn write_start(cycle: &Cycle, file: &Path) -> Outcome<()> {
-    let (n, nodes) = (cycle.dim(), Scheme::new(cycle.degree).nodes);
+    let (n, nodes) = (cycle.dim(), cycle.scheme().nodes.clone());
     let mut text = String::new();
     let mut line = |t: f64, x: &[f64]| {
         let values: Vec<String> = std::iter::once(&t).chain(x).map(|v| format!("{v:.17e}")).collect();

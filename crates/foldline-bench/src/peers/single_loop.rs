@@ -15,7 +15,6 @@ use crate::{Outcome, clock, rotor};
 use foldline::diagram::{Branch, Point, Solution};
 use foldline::explore::{Plan, System};
 use foldline::problem::extremes;
-use foldline::problem::gauss::Scheme;
 
 /// Values of NCOL.
 const DEGREES: [&str; 4] = ["4", "5", "6", "7"];
@@ -58,9 +57,7 @@ fn point(system: &System, like: &Point, omega: f64, solution: Solution) -> Point
     let mut parameters = like.parameters.clone();
     parameters[rotor::OMEGA] = omega;
     let ranges = match &solution {
-        Solution::Cycle(c) => {
-            extremes::of_profile(system.field, &parameters, [&c.profile, &c.mesh], 0, &Scheme::new(c.degree))
-        }
+        Solution::Cycle(c) => extremes::of_profile(system.field, &parameters, [&c.profile, &c.mesh], 0, c.scheme()),
         Solution::Equilibrium(_) | Solution::Torus(_) => Vec::new(),
     };
     Point { parameters, solution, ranges, ..like.clone() }

@@ -13,7 +13,6 @@
 
 use super::rotor::{max_r, parameters};
 use foldline::diagram::{Branch, Cycle, Point, Solution};
-use foldline::problem::gauss::Scheme;
 
 /// Largest defects of I1, I2, I3 and I4, each relative to the sum of its terms, over all cycles of some branches; and
 /// the number of cycles.
@@ -42,7 +41,7 @@ fn of_cycle(point: &Point, cycle: &Cycle) -> [f64; 4] {
 
 /// Means over a cycle, by Gauss quadrature: |U'|² = Σ (k w)²|c_k|², u v' - v u' = Σ k w |c_k|², |U|², v.
 fn averages(cycle: &Cycle) -> [f64; 4] {
-    let scheme = Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     let mut sums = [0.0; 4];
     for (j, interval) in cycle.profile.chunks_exact(4 * (cycle.degree + 1)).enumerate() {
         let h = cycle.mesh[j + 1] - cycle.mesh[j];

@@ -117,7 +117,7 @@ impl BackboneProblem {
         if let (Outcome::Reached, Some(last)) = (arrival.outcome, mesh.last_mut()) {
             *last = 1.0;
         }
-        Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() }
+        Cycle { points: foldline::problem::gauss::Points::Gauss, period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() }
     }
 }
 
@@ -189,7 +189,7 @@ impl ZeroProblem for BackboneProblem {
     fn examine(&mut self, u: &[f64]) -> Examination {
         let cycle = self.cycle(u);
         let parameters = self.at(u[3]).parameters();
-        let scheme = Scheme::new(cycle.degree);
+        let scheme = cycle.scheme();
         let ranges = match cycle.profile.iter().all(|x| x.is_finite()) && cycle.intervals() > 0 {
             true => extremes::of_profile(&self.rotor, &parameters, [&cycle.profile, &cycle.mesh], 0, &scheme),
             false => vec![[f64::NAN; 2]; 5],

@@ -2,7 +2,6 @@
 
 use foldline::diagram::{Branch, Kind, Origin, Point, Response, Solution, SpecialPoint};
 use foldline::model::Model;
-use foldline::problem::gauss::Scheme;
 use foldline::special::quantity::Quantity;
 
 /// Contents of one cell.
@@ -136,7 +135,7 @@ pub(super) fn branch_cells(branch: &Branch, model: &Model, points: u64) -> Vec<C
 /// angle increased by its gain over the period.
 pub(super) fn profile(point: &Point) -> Option<(Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
-    let scheme = Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     // An iterate of a map lasts until the next one.
     let nodes = &scheme.nodes[..=cycle.degree];
     let mut times = Vec::with_capacity(cycle.profile.len() / cycle.dim().max(1) + 1);

@@ -36,7 +36,7 @@ use std::path::{Path, PathBuf};
 
 /// Version of the format written here. Files of a newer version are rejected. The version is raised by any change that
 /// older readers would misunderstand.
-pub const FORMAT_VERSION: i64 = 10;
+pub const FORMAT_VERSION: i64 = 11;
 
 /// Application id that marks an SQLite file as a run file ("fold" in ASCII).
 pub const APPLICATION_ID: i64 = 0x666f_6c64;

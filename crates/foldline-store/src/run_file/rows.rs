@@ -4,8 +4,12 @@ use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_comp
 use foldline::diagram::{
     Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Torus, Trust,
 };
+use foldline::problem::gauss::Points;
 use rusqlite::Row;
 use rusqlite::types::Value;
+
+/// Added to the degree of cycles at Radau points.
+const RADAU: usize = 100;
 
 /// Values of the named columns and the columns of a point, in the order of the insertion. `extra` numbers are stored
 /// with the scalars; `named` is the number of named columns. A connecting orbit has further parameters, which are stored
@@ -14,7 +18,9 @@ pub(super) fn values_of(point: &Point, extra: &[f64], named: usize) -> Vec<Value
     let count = |n: usize| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX));
     let (degree, profile) = match &point.solution {
         Solution::Equilibrium(state) => (Value::Null, state),
-        Solution::Cycle(cycle) => (count(cycle.degree), &cycle.profile),
+        Solution::Cycle(cycle) => {
+            (count(cycle.degree + RADAU * usize::from(cycle.points == Points::Radau)), &cycle.profile)
+        }
         // The sign tells tori from cycles; their rotation number takes the place of gains.
         Solution::Torus(torus) => (Value::Integer(-(torus.degree as i64)), &torus.profile),
     };
@@ -240,6 +246,8 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         Some(_) => {
             let mesh = if whole { numbers("mesh_bytes")? } else { Vec::new() };
             let degree = count("degree")?;
+            let (degree, points) =
+                if degree > RADAU { (degree - RADAU, Points::Radau) } else { (degree, Points::Gauss) };
             let nodes = mesh.len().saturating_sub(1) * (degree + 1);
             // Both are empty if the profile has been removed.
             let removed = mesh.is_empty() && profile.is_empty();
@@ -248,7 +256,15 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             }
             let forcing_periods = u32::try_from(later("forcing_periods")?).map_err(|e| e.to_string())?;
             let gain = unpack(&newer_bytes("gain_bytes")?).ok_or("gain_bytes is not a list of numbers")?;
-            Solution::Cycle(Cycle { period: *period, forcing_periods, mesh: mesh.into(), degree, profile, gain })
+            Solution::Cycle(Cycle {
+                period: *period,
+                forcing_periods,
+                mesh: mesh.into(),
+                degree,
+                points,
+                profile,
+                gain,
+            })
         }
     };
     let point = Point {

@@ -30,6 +30,7 @@ fn point(position: i64, intervals: usize) -> Point {
     let solution = match intervals {
         0 => Solution::Equilibrium(list(2, 5)),
         _ => Solution::Cycle(Cycle {
+            points: foldline::problem::gauss::Points::Gauss,
             period: 0.1 + 0.2,
             forcing_periods: 3,
             mesh: ends.into(),

@@ -283,7 +283,7 @@ pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidat
 /// Returns a cycle with the states of the circle added and its period counted in forcing periods.
 fn with_circle(mut point: Point, n: usize) -> Option<Point> {
     let Solution::Cycle(cycle) = &mut point.solution else { return None };
-    let scheme = crate::problem::gauss::Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     let turns = f64::from(cycle.forcing_periods);
     let mut profile = Vec::with_capacity(cycle.profile.len() / n * (n + 2));
     let mut nodes = cycle.profile.chunks_exact(n);

@@ -220,7 +220,15 @@ fn whirling(lines: &[(i32, f64)]) -> Cycle {
             profile.extend([0.0, z.re, z.im]);
         }
     }
-    Cycle { period: 3.0, forcing_periods: 0, mesh: mesh.into(), degree: 6, profile, gain: Vec::new() }
+    Cycle {
+        points: crate::problem::gauss::Points::Gauss,
+        period: 3.0,
+        forcing_periods: 0,
+        mesh: mesh.into(),
+        degree: 6,
+        profile,
+        gain: Vec::new(),
+    }
 }
 
 #[test]

@@ -1,11 +1,11 @@
 //! A periodic orbit as piecewise polynomials.
 
 use super::Mesh;
-use crate::problem::gauss::Scheme;
+use crate::problem::gauss::{Points, Scheme};
 
 /// A periodic orbit: polynomials of degree m on each of N mesh intervals, in normalised time t/T ∈ [0, 1].
 ///
-/// On interval j the polynomial is given by its values at the left end and at the m Gauss points, so the profile is
+/// On interval j the polynomial is given by its values at the left end and at the m collocation points, so the profile is
 /// laid out `[interval][node 0..=m][component]`; node 0 is the left end. The orbit closes: the right end of the last
 /// interval is the left end of the first, plus `gain` if angles turn.
 ///
@@ -20,6 +20,8 @@ pub struct Cycle {
     pub mesh: Mesh,
     /// m.
     pub degree: usize,
+    /// Kind of the collocation points.
+    pub points: Points,
     /// `[N · (m + 1) · n]` values.
     pub profile: Vec<f64>,
     /// `[n]` x(T) - x(0): a whole number of turns for each angle, 0 for other states; empty if no angle turns.
@@ -53,7 +55,41 @@ impl Cycle {
             }
         }
         let mesh: Vec<f64> = times.iter().copied().step_by(through).collect();
-        Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: scheme.degree, profile, gain: Vec::new() })
+        Some(Cycle {
+            points: crate::problem::gauss::Points::Gauss,
+            period,
+            forcing_periods: 0,
+            mesh: mesh.into(),
+            degree: scheme.degree,
+            profile,
+            gain: Vec::new(),
+        })
+    }
+
+    /// An equilibrium as a cycle of period `period`.
+    pub(crate) fn at_rest(state: &[f64], period: f64, degree: usize, mesh: &Mesh) -> Cycle {
+        let nodes = mesh.len().saturating_sub(1) * (degree + 1);
+        let (mesh, profile) = (mesh.clone(), state.repeat(nodes));
+        Cycle { period, forcing_periods: 0, mesh, degree, points: Points::Gauss, profile, gain: Vec::new() }
+    }
+
+    /// The collocation scheme.
+    pub fn scheme(&self) -> &'static Scheme {
+        Scheme::at(self.degree, self.points)
+    }
+
+    /// The same polynomials by their values at collocation points of another kind.
+    pub fn with_points(mut self, points: Points) -> Cycle {
+        if self.points != points && self.degree > 0 {
+            let (old, new, n) = (self.scheme(), Scheme::at(self.degree, points), self.dim());
+            for interval in self.profile.chunks_exact_mut((self.degree + 1) * n.max(1)) {
+                let before = interval.to_vec();
+                let nodes = interval.chunks_exact_mut(n.max(1)).zip(&new.nodes);
+                nodes.skip(1).for_each(|(x, c)| old.value_into(*c, &before, x));
+            }
+            self.points = points;
+        }
+        self
     }
 
     /// Number of mesh intervals N.
@@ -74,13 +110,13 @@ impl Cycle {
     /// Returns the state `[n]` at normalised time `t`, which may lie outside [0, 1].
     pub fn state(&self, t: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
-        self.state_into(Scheme::of(self.degree), t, &mut x);
+        self.state_into(self.scheme(), t, &mut x);
         x
     }
 
     /// Returns `count` states `[count][n]` at uniformly spaced times over one period, the end point excluded.
     pub fn uniform(&self, count: usize) -> Vec<f64> {
-        let (n, scheme) = (self.dim(), Scheme::of(self.degree));
+        let (n, scheme) = (self.dim(), self.scheme());
         let mut out = vec![0.0; count * n];
         let mut j = 1;
         for (s, x) in out.chunks_exact_mut(n.max(1)).enumerate() {
@@ -97,10 +133,10 @@ impl Cycle {
     pub(crate) fn end(&self) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
         if self.degree == 0 {
-            self.state_into(Scheme::of(self.degree), 1.0, &mut x);
+            self.state_into(self.scheme(), 1.0, &mut x);
             return x;
         }
-        self.state_within(Scheme::of(self.degree), self.intervals() - 1, 1.0, &mut x);
+        self.state_within(self.scheme(), self.intervals() - 1, 1.0, &mut x);
         x
     }
 

@@ -326,6 +326,7 @@ fn cut<'s>(
     let mesh: Vec<f64> = mesh.iter().map(|t| (t - from) / (to - from)).collect();
     let parameters = field.parameters(&point.parameters, length, &places, sizes, gain);
     let solution = Cycle {
+        points: crate::problem::gauss::Points::Gauss,
         period: length,
         forcing_periods: 1,
         mesh: mesh.into(),
@@ -388,6 +389,7 @@ fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usiz
     let cycle = match &start.point.solution {
         Solution::Cycle(cycle) => cycle.clone(),
         Solution::Equilibrium(_) | Solution::Torus(_) => Cycle {
+            points: crate::problem::gauss::Points::Gauss,
             period: 1.0,
             forcing_periods: 1,
             mesh: vec![0.0, 1.0].into(),
@@ -473,7 +475,7 @@ fn lengthened(start: &Start, share: f64) -> Option<Point> {
         let moved = ends[end].iter().zip(&ys[end]).zip(&y).enumerate();
         moved.map(|(c, ((x, y0), y))| x + field.scale(c) * (y - y0)).collect()
     };
-    let scheme = Scheme::new(cycle.degree);
+    let scheme = cycle.scheme();
     let piece = |end: usize| -> Vec<f64> {
         (0..=PIECES).map(|k| times[end] * (k as f64 / PIECES as f64 - if end == 0 { 1.0 } else { 0.0 })).collect()
     };

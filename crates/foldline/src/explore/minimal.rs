@@ -78,6 +78,7 @@ fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, 
     let end = 1.0 / turns as f64;
     let intervals = equal.mesh.iter().position(|t| (t - end).abs() <= 4.0 * f64::EPSILON)?;
     let turn = Cycle {
+        points: cycle.points,
         period: equal.period / turns as f64,
         forcing_periods: forcing_periods / turns as u32,
         mesh: equal.mesh[..=intervals].iter().map(|t| t * turns as f64).collect(),

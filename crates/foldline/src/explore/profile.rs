@@ -81,7 +81,15 @@ pub(super) fn first_profile(
             }
         }
     }
-    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile, gain }
+    Cycle {
+        points: crate::problem::gauss::Points::Gauss,
+        period,
+        forcing_periods: 0,
+        mesh: mesh.into(),
+        degree: 4,
+        profile,
+        gain,
+    }
 }
 
 /// Interpolates component i by the cubic through the four samples around interval k-1…k.
@@ -116,7 +124,7 @@ pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
         && cycle.degree != degree
         && cycle.degree > 0
     {
-        let (old, new) = (Scheme::new(cycle.degree), Scheme::new(degree));
+        let (old, new) = (cycle.scheme(), Scheme::at(degree, cycle.points));
         let n = cycle.dim();
         let mut profile = Vec::with_capacity(cycle.intervals() * (degree + 1) * n);
         for interval in cycle.profile.chunks_exact((cycle.degree + 1) * n) {

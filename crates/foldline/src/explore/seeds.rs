@@ -24,6 +24,7 @@ use crate::contract::{Event, Examination, Observer, Unobserved};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
+use crate::problem::stiffness;
 use crate::special::impact::inadmissible;
 use std::sync::OnceLock;
 
@@ -362,7 +363,8 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
 }
 
 /// Solves near a candidate, coarsely and on its own mesh: a candidate far from a solution is not worth a finer mesh.
-pub(super) fn near(system: &System, degree: usize, settings: &Settings, mut guess: Point) -> Result<Point, Failure> {
+pub(super) fn near(system: &System, degree: usize, settings: &Settings, guess: Point) -> Result<Point, Failure> {
+    let mut guess = suited(system, guess);
     let mut problem = problem_of(system, 0, degree, &guess, false);
     let coarse = Settings { tolerance: 1e-2, max_newton: 6, ..settings.clone() };
     let mut u = problem.unknowns_of(&guess);
@@ -371,6 +373,13 @@ pub(super) fn near(system: &System, degree: usize, settings: &Settings, mut gues
     correct(&mut *problem, &coarse, &plane, &mut u, &mut Cost::default())?;
     guess.solution = problem.point(&u, &[], Examination::default()).solution;
     Ok(guess)
+}
+
+/// Returns a start of a branch with the collocation points that suit it.
+pub(super) fn suited(system: &System, point: Point) -> Point {
+    let Solution::Cycle(cycle) = point.solution else { return point };
+    let points = stiffness::suited(system.field, &system.scales, &point.parameters, &cycle);
+    Point { solution: Solution::Cycle(cycle.with_points(points)), ..point }
 }
 
 /// Returns a point with only the parameters and the solution.

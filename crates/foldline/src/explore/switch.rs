@@ -13,8 +13,9 @@ use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, S
 use crate::problem::cycle::CycleProblem;
 use crate::problem::impact::{Flights, ImpactProblem};
 use crate::problem::map::MapProblem;
-use crate::problem::{gauss::Scheme, mesh};
+use crate::problem::{gauss::Scheme, mesh, stiffness};
 use crate::special::{branch_point, hopf, map_form, period_doubling};
+use std::f64::consts::TAU;
 
 /// Distances along the direction in the order of trial, in scaled variables. The shorter ones are for branches that
 /// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
@@ -183,7 +184,7 @@ fn coarsened(cycle: &Cycle) -> Cycle {
         return cycle.clone();
     }
     let mesh: Mesh = cycle.mesh.iter().copied().step_by(2).collect();
-    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
+    let profile = mesh::transferred(&cycle.profile, cycle.dim(), cycle.scheme(), &cycle.mesh, &mesh);
     Cycle { mesh, profile, ..cycle.clone() }
 }
 
@@ -288,11 +289,13 @@ fn born(
         ));
     }
     let mesh = mesh::uniform(20);
-    let scheme = Scheme::new(degree);
-    let (mut direction, period) = hopf::direction(system.field, &at.point, omega, &system.scales, &scheme, &mesh)
+    let Solution::Equilibrium(x) = &at.point.solution else { return Err("it is no equilibrium".into()) };
+    let cycle = Cycle::at_rest(x, TAU / omega, degree, &mesh);
+    let scheme = Scheme::at(degree, stiffness::suited(system.field, &system.scales, &at.point.parameters, &cycle));
+    let (mut direction, period) = hopf::direction(system.field, &at.point, omega, &system.scales, scheme, &mesh)
         .ok_or("no eigenvector of an imaginary pair of eigenvalues was found")?;
     direction.extend([0.0, 0.0]);
-    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), degree, &mesh);
+    let mut problem = CycleProblem::with(setting(system, free, &at.point.parameters), scheme, &mesh);
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;

@@ -137,6 +137,7 @@ fn repeated(cycle: &Cycle, turns: usize) -> Cycle {
         forcing_periods: cycle.forcing_periods * turns as u32,
         mesh: std::iter::once(0.0).chain((0..turns).flat_map(times)).collect(),
         degree: cycle.degree,
+        points: cycle.points,
         profile: cycle.profile.repeat(turns),
         gain: Vec::new(),
     }

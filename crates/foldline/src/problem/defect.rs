@@ -11,7 +11,7 @@
 //!   (1)  local error   w(s) = ∫₀ˢ d ds           (largest at the Gauss points, where d vanishes)
 //!   (2)  v' = h T J v + h T J w                  error of the cycle beyond w, continuous except for jumps by w(1)
 //!
-//! d is integrated through its values at the m + 1 Gauss points of the next degree, exactly for its leading term.
+//! d is integrated through its values at the m + 1 collocation points of the next degree, exactly for its leading term.
 //! Within an interval w(1) and the source of (2) are of the same, higher order. The source, h T (f(U + w) - f(U)), is
 //! projected onto the polynomials that collocation at the Gauss points integrates, so that (2) has the matrix of the
 //! cycle itself.
@@ -21,7 +21,7 @@
 mod columns;
 pub use columns::correct_in_columns;
 
-use super::gauss::{Scheme, gauss_legendre};
+use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
 
 use crate::linalg::lane::{self, Eight, Lane, intact};
@@ -54,12 +54,18 @@ impl Sampling {
         self.integrals[m * (m + 1) + point]
     }
 
+    /// `[m + 1]`: integral of the defect to a sample point, from its values at all of them.
+    pub fn shares(&self, point: usize) -> &[f64] {
+        let points = self.points.len();
+        &self.partial[point * points..(point + 1) * points]
+    }
+
     /// Sampling for a scheme.
     pub fn new(scheme: &Scheme) -> Sampling {
         let m = scheme.degree;
-        let (points, weights) = gauss_legendre(m + 1);
+        let (points, weights) = scheme.points.with_weights(m + 1);
         let values = points.iter().flat_map(|&s| scheme.interpolation(s)).collect();
-        // p' is a polynomial of degree m - 1 known at the m Gauss points.
+        // p' is a polynomial of degree m - 1 known at the m collocation points.
         let through = |nodes: &[f64], k: usize, s: f64| -> f64 {
             (0..nodes.len()).filter(|&l| l != k).map(|l| (s - nodes[l]) / (nodes[k] - nodes[l])).product()
         };
@@ -78,12 +84,12 @@ impl Sampling {
             })
             .collect();
         let to = |c: f64, k: usize| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum::<f64>();
-        let inner = scheme.nodes[1..].iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>());
-        let integrals = inner.chain(weights.iter().copied()).collect();
+        let to_nodes = scheme.nodes[1..].iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>());
+        let integrals = to_nodes.chain(weights.iter().copied()).collect();
         let partial = points.iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>()).collect();
-        // The Lagrange polynomials of the Gauss points are orthogonal, with the weights as their squares.
-        let gauss = &scheme.nodes[1..];
-        let projected = |k: usize, g: usize| weights[g] * through(gauss, k, points[g]) / scheme.weights[k];
+        // The Lagrange polynomials of the collocation points are orthogonal, with the weights as their squares.
+        let inner = &scheme.nodes[1..];
+        let projected = |k: usize, g: usize| weights[g] * through(inner, k, points[g]) / scheme.weights[k];
         let line = |i: usize| {
             (0..=m).map(move |g| (0..m).map(|k| scheme.integration[i * m + k] * projected(k, g)).sum::<f64>())
         };
@@ -431,7 +437,8 @@ mod tests {
         let end = scheme.end[0] + crate::linalg::dot(&scheme.end[1..], &inner);
         let exact = (0.4f64 + 0.16).exp();
         let before = (end - exact).abs();
-        let jacobians: Vec<f64> = gauss_legendre(m + 1).0.into_iter().map(|s| rate(s) / 0.4).collect();
+        let jacobians: Vec<f64> =
+            crate::problem::gauss::Points::Gauss.with_weights(m + 1).0.into_iter().map(|s| rate(s) / 0.4).collect();
         let mut gain = [0.0];
         let course = Course { jacobians: &jacobians, lengths: &[0.4], gains: &mut gain };
         correct(&sampling, &inner, &mut [course], 1);

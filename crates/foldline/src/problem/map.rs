@@ -69,6 +69,7 @@ pub fn mesh_of(count: usize) -> Mesh {
 pub fn cycle_of(iterates: &[f64], n: usize, gain: &[f64]) -> Cycle {
     let count = iterates.len() / n.max(1);
     Cycle {
+        points: crate::problem::gauss::Points::Gauss,
         period: count as f64,
         forcing_periods: count as u32,
         mesh: mesh_of(count),

@@ -23,6 +23,7 @@ pub mod map;
 pub mod mesh;
 pub(crate) mod piecewise;
 pub mod setting;
+pub(crate) mod stiffness;
 pub mod torus;
 mod unfolding;
 

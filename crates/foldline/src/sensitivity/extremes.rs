@@ -16,7 +16,6 @@
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Cycle, Point, Solution};
-use crate::problem::gauss::Scheme;
 use std::f64::consts::PI;
 
 /// Degree of the interpolant on a mesh interval.
@@ -206,7 +205,7 @@ fn of_iterates(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
 }
 
 fn of_cycle(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<Extreme> {
-    let (n, count, scheme) = (field.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    let (n, count, scheme) = (field.dim(), cycle.intervals(), cycle.scheme());
     let (block, lanes) = ((cycle.degree + 1) * n, count * (DEGREE + 1));
     let places: Vec<f64> = (0..=DEGREE).map(|k| 0.5 - 0.5 * (PI * k as f64 / DEGREE as f64).cos()).collect();
     let (mut states, mut times, mut x) = (vec![0.0; n * lanes], Vec::new(), vec![0.0; n]);

@@ -7,7 +7,6 @@
 use super::hopf;
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
-use crate::problem::gauss::Scheme;
 use crate::problem::mesh;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -64,7 +63,7 @@ impl Halves<'_> {
         }
         let n = cycle.dim();
         let [mut one, mut other] = [vec![0.0; n], vec![0.0; n]];
-        let scheme = Scheme::of(cycle.degree);
+        let scheme = cycle.scheme();
         // Most cycles already differ at the first sample.
         at.ranges.len() >= n
             && (0..SAMPLES / 2).all(|k| {
@@ -244,7 +243,7 @@ impl Monitor for Halves<'_> {
 
 /// Result of [`compare`] for deviations from the means, by Gauss quadrature.
 fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
-    let (scheme, n) = (Scheme::of(a.degree), a.dim());
+    let (scheme, n) = (a.scheme(), a.dim());
     let block = (a.degree + 1) * n;
     // Means of a, b, a² and a b.
     let mut sums = vec![[0.0; 4]; n];

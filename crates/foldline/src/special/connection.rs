@@ -20,7 +20,6 @@
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Connection, Cycle, Ending, Point, Shown, Solution};
 use crate::linalg::{dot, lu};
-use crate::problem::gauss::Scheme;
 use crate::stability::eigenvalues;
 use std::f64::consts::PI;
 
@@ -89,7 +88,7 @@ impl Limits<'_> {
     }
 
     fn nodes(&self, cycle: &Cycle, parameters: &[f64], extents: &[f64]) -> Vec<Node> {
-        let (n, m, scheme) = (cycle.dim(), cycle.degree, Scheme::of(cycle.degree));
+        let (n, m, scheme) = (cycle.dim(), cycle.degree, cycle.scheme());
         let mut nodes = Vec::with_capacity(cycle.intervals() * m);
         for (block, ends) in cycle.profile.chunks_exact((m + 1) * n).zip(cycle.mesh.windows(2)) {
             for (x, weight) in block[n..].chunks_exact(n).zip(&scheme.weights) {

@@ -94,7 +94,7 @@ fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
     const SHARE: f64 = 1e-6;
     /// Shortest interval, in periods: four digits above the rounding of a mesh boundary.
     const SHORTEST: f64 = 1e-12;
-    let scheme = Scheme::of(cycle.degree);
+    let scheme = cycle.scheme();
     let state = |t: f64| {
         let mut x = vec![0.0; cycle.dim()];
         cycle.state_into(scheme, t, &mut x);
@@ -309,7 +309,15 @@ mod tests {
         let places =
             mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
         let profile = places.flat_map(|t| [(TAU * t).cos(), (TAU * t).sin()]).collect();
-        let cycle = Cycle { period: TAU, forcing_periods: 0, mesh, degree, profile, gain: Vec::new() };
+        let cycle = Cycle {
+            points: crate::problem::gauss::Points::Gauss,
+            period: TAU,
+            forcing_periods: 0,
+            mesh,
+            degree,
+            profile,
+            gain: Vec::new(),
+        };
         let point = Point {
             position: 0,
             parameters: model.defaults(),

@@ -27,7 +27,6 @@ use super::on_cycles::OnCycles;
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point, Solution};
 use crate::linalg::system::System;
-use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
@@ -88,7 +87,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
 /// Transfers the cycle of a point to another mesh.
 pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
-    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, mesh);
+    let profile = mesh::transferred(&cycle.profile, cycle.dim(), cycle.scheme(), &cycle.mesh, mesh);
     let solution = Solution::Cycle(Cycle { mesh: mesh.clone(), profile, ..cycle.clone() });
     Some(Point { solution, ..at.clone() })
 }
@@ -101,7 +100,7 @@ pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
     if count == 0 || n == 0 {
         return 0;
     }
-    let scheme = Scheme::of(cycle.degree);
+    let scheme = cycle.scheme();
     let lanes = cycle.profile.len() / n;
     let states: Vec<f64> = (0..n).flat_map(|c| cycle.profile.iter().skip(c).step_by(n).copied()).collect();
     let places = cycle.mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(|c| pair[0] + (pair[1] - pair[0]) * c));
@@ -253,7 +252,7 @@ mod tests {
         state: impl Fn(f64) -> Vec<f64>,
     ) -> Option<f64> {
         let (degree, mesh) = (4, mesh::uniform(60));
-        let scheme = Scheme::new(degree);
+        let scheme = crate::problem::gauss::Scheme::new(degree);
         let places =
             mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
         let profile = places.flat_map(&state).collect();
@@ -261,6 +260,7 @@ mod tests {
             position: 0,
             parameters: model.defaults(),
             solution: Solution::Cycle(Cycle {
+                points: crate::problem::gauss::Points::Gauss,
                 period,
                 forcing_periods: u32::from(model.forced()),
                 mesh: mesh.clone(),

@@ -131,7 +131,7 @@ impl<'a> Along<'a> {
             (0..count).for_each(|j| samples.push(j as f64 / count as f64, j * self.n(), &[1.0], 1.0 / count as f64));
             return samples;
         }
-        let scheme = Scheme::of(cycle.degree);
+        let scheme = cycle.scheme();
         let block = (cycle.degree + 1) * self.n();
         samples.nodes = cycle.degree + 1;
         for (j, ends) in cycle.mesh.windows(2).enumerate() {
@@ -151,7 +151,7 @@ impl<'a> Along<'a> {
     fn at(&self, cycle: &Cycle, time: f64) -> Samples {
         let (j, s) = place(cycle, time);
         let mut samples = Samples { times: vec![], starts: vec![], basis: vec![], nodes: 1, weights: vec![] };
-        let scheme = Scheme::of(cycle.degree);
+        let scheme = cycle.scheme();
         samples.nodes = cycle.degree + 1;
         samples.push(time, j * (cycle.degree + 1) * self.n(), &scheme.interpolation(s), 1.0);
         samples
@@ -285,7 +285,7 @@ impl<'a> Along<'a> {
             found.sort_by(|a, b| (sign * b.value).total_cmp(&(sign * a.value)));
             return found;
         }
-        let scheme = Scheme::of(cycle.degree);
+        let scheme = cycle.scheme();
         for (j, ends) in cycle.mesh.windows(2).enumerate() {
             for part in 0..SECTIONS {
                 let s = part as f64 / SECTIONS as f64;
@@ -350,7 +350,7 @@ impl<'a> Along<'a> {
         let samples = self.at(cycle, time);
         let [_, gx, _, gt] = self.linear(channel, &samples)?;
         let nodes = &cycle.profile[j * (cycle.degree + 1) * n..][..(cycle.degree + 1) * n];
-        let slopes = slopes(Scheme::of(cycle.degree), s);
+        let slopes = slopes(cycle.scheme(), s);
         let length = cycle.mesh[j + 1] - cycle.mesh[j];
         let moved = |c: usize| slopes.iter().enumerate().map(|(l, d)| d * nodes[l * n + c]).sum::<f64>() / length;
         Some((0..n).map(|c| gx[c] * moved(c)).sum::<f64>() + f64::from(cycle.forcing_periods) * gt[0])

@@ -29,7 +29,6 @@ mod pairs;
 use super::sliding;
 use crate::contract::{Batch, Events, Monitor, Parameters, Separate, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
-use crate::problem::gauss::Scheme;
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours; extrema are then found by
 /// parabolas.
@@ -276,7 +275,7 @@ fn value(field: &dyn VectorField, parameters: &[f64], states: &[f64], times: &[f
 
 /// The local extrema of a switch along a cycle, and its largest absolute value.
 pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: usize) -> (Vec<Extremum>, f64) {
-    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     if n == 0 || intervals == 0 {
         return (Vec::new(), 0.0);
     }

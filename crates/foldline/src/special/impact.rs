@@ -22,7 +22,6 @@
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Ending, Kind, Point, Solution};
 use crate::linalg::dot;
-use crate::problem::gauss::Scheme;
 use crate::problem::impact::stored::{Impact, impacts, surfaces, times_of};
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours.
@@ -100,7 +99,7 @@ pub fn inadmissible(field: &dyn VectorField, at: &Point) -> Option<String> {
         Solution::Torus(_) => return None,
         Solution::Cycle(cycle) => cycle,
     };
-    let (n, scheme) = (cycle.dim(), Scheme::of(cycle.degree));
+    let (n, scheme) = (cycle.dim(), cycle.scheme());
     for (pair, nodes) in cycle.mesh.windows(2).zip(cycle.profile.chunks_exact((cycle.degree + 1) * n)) {
         for (x, c) in nodes.chunks_exact(n).zip(&scheme.nodes).skip(1) {
             let own = forbidden(x, &times_of(cycle, pair[0] + c * (pair[1] - pair[0])));
@@ -162,7 +161,7 @@ pub(crate) struct Highest {
 /// The largest of the maxima (2).
 pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Highest {
     let all = impacts(field, parameters, cycle);
-    let (n, count, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    let (n, count, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     let block = (cycle.degree + 1) * n;
     let at = |place: f64| -> Vec<f64> {
         // Intervals are counted on beyond the end of the period.

@@ -89,7 +89,7 @@ impl<'a> OnCycleBranchPoints<'a> {
     /// Creates the condition on the mesh of `cycle`; the first free parameter of the
     /// setting is the amplitude of the unfolding.
     pub fn new(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
-        let (scheme, n) = (Scheme::new(cycle.degree), setting.field.dim());
+        let (scheme, n) = (cycle.scheme().clone(), setting.field.dim());
         let scalars = 2 + usize::from(cycle.forcing_periods == 0);
         let across = (0..setting.freedom() - 1).map(|k| if k == 0 { 1.0 } else { 0.0 }).collect();
         let mut own = OnCycleBranchPoints {

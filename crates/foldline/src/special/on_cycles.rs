@@ -107,8 +107,8 @@ impl<'a> OnCycles<'a> {
 
     /// Creates a condition without a system and without initialised borders.
     fn empty(kind: Kind, setting: Setting<'a>, cycle: &Cycle, bordered: bool) -> Option<OnCycles<'a>> {
-        let Cycle { degree, forcing_periods, ref mesh, .. } = *cycle;
-        let (scheme, n) = (Scheme::new(degree), setting.field.dim());
+        let Cycle { forcing_periods, ref mesh, .. } = *cycle;
+        let (scheme, n) = (cycle.scheme().clone(), setting.field.dim());
         let parts = match kind {
             Kind::Fold | Kind::PeriodDoubling => n,
             Kind::Torus => 2 * n,

@@ -83,16 +83,18 @@ impl<'a> OnLevels<'a> {
 
     /// The solution with the unknowns `own`, with an interval for each part between switchings, and its parameters.
     fn solution(&mut self, own: &[f64], parameters: &[f64]) -> Option<Solution> {
-        let (degree, mesh, forcing_periods, gain) = match &self.like {
+        let (degree, points, mesh, forcing_periods, gain) = match &self.like {
             Solution::Equilibrium(_) => return Some(Solution::Equilibrium(own.to_vec())),
             Solution::Torus(_) => return None,
-            Solution::Cycle(cycle) => (cycle.degree, cycle.mesh.clone(), cycle.forcing_periods, cycle.gain.clone()),
+            Solution::Cycle(cycle) => {
+                (cycle.degree, cycle.points, cycle.mesh.clone(), cycle.forcing_periods, cycle.gain.clone())
+            }
         };
         if degree == 0 {
             let n = self.setting.field.dim();
             return Some(Solution::Cycle(crate::problem::map::cycle_of(own, n, &gain)));
         }
-        let (size, scheme) = (own.len() - 1, Scheme::of(degree));
+        let (size, scheme) = (own.len() - 1, Scheme::at(degree, points));
         let block = (degree + 1) * self.setting.field.dim();
         let (mesh, profile) = match self.setting.field.switch_count() {
             0 => (mesh, own[..size].to_vec()),
@@ -105,7 +107,7 @@ impl<'a> OnLevels<'a> {
         };
         let all = self.setting.at(parameters);
         let period = own[size] * self.setting.field.time_unit(&all);
-        Some(Solution::Cycle(Cycle { period, forcing_periods, mesh, degree, profile, gain }))
+        Some(Solution::Cycle(Cycle { points: points, period, forcing_periods, mesh, degree, profile, gain }))
     }
 }
 

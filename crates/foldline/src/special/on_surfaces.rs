@@ -73,15 +73,15 @@ impl<'a> OnSurfaces<'a> {
             let value = |switch: &usize| least(*switch).unwrap_or(f64::INFINITY);
             value(a).total_cmp(&value(b))
         })?;
-        let (degree, mesh, forcing_periods) = match at {
-            Solution::Equilibrium(_) | Solution::Torus(_) => (1, Mesh::from([]), 0),
-            Solution::Cycle(cycle) => (cycle.degree, cycle.mesh.clone(), cycle.forcing_periods),
+        let (scheme, mesh, forcing_periods) = match at {
+            Solution::Equilibrium(_) | Solution::Torus(_) => (Scheme::of(1), Mesh::from([]), 0),
+            Solution::Cycle(cycle) => (cycle.scheme(), cycle.mesh.clone(), cycle.forcing_periods),
         };
         Some(OnSurfaces {
             setting,
             kind,
             switch,
-            scheme: Scheme::new(degree),
+            scheme: scheme.clone(),
             mesh,
             forcing_periods,
             time: None,
@@ -107,6 +107,7 @@ impl<'a> OnSurfaces<'a> {
     /// A profile on the mesh with an interval for each part between switchings.
     fn cycle(&self, mesh: Mesh, profile: Vec<f64>) -> Cycle {
         Cycle {
+            points: self.scheme.points,
             period: 1.0,
             forcing_periods: self.forcing_periods,
             mesh,
@@ -228,6 +229,7 @@ mod tests {
             times.flat_map(|t| [size * (TAU * t + 0.3).cos(), -size * (TAU * t + 0.3).sin()]).collect()
         };
         let cycle = Cycle {
+            points: crate::problem::gauss::Points::Gauss,
             period: TAU,
             forcing_periods: 0,
             mesh: mesh.clone(),

@@ -50,5 +50,5 @@ pub fn doubled(cycle: &Cycle, direction: &[f64]) -> (Cycle, Vec<f64>) {
     let gain = cycle.gain.iter().map(|gain| 2.0 * gain).collect();
     let perturbation = direction.iter().copied().chain(direction.iter().map(|v| -v)).collect();
     let (period, forcing_periods) = (2.0 * cycle.period, 2 * cycle.forcing_periods);
-    (Cycle { period, forcing_periods, mesh, degree: cycle.degree, profile, gain }, perturbation)
+    (Cycle { period, forcing_periods, mesh, degree: cycle.degree, points: cycle.points, profile, gain }, perturbation)
 }

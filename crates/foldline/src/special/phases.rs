@@ -7,7 +7,6 @@
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Cycle;
-use crate::problem::gauss::Scheme;
 
 /// Value of a switch, relative to its largest along the cycle, on its surface.
 const ON_SURFACE: f64 = 1e-8;
@@ -29,7 +28,7 @@ pub fn phases(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec
     if cycle.degree == 0 || cycle.profile.len() != intervals * block || count == 0 {
         return Vec::new();
     }
-    let scheme = Scheme::of(cycle.degree);
+    let scheme = cycle.scheme();
     let (mut states, mut x) = (vec![0.0; n * intervals], vec![0.0; n]);
     for (j, nodes) in cycle.profile.chunks_exact(block).enumerate() {
         scheme.value_into(0.5, nodes, &mut x);
@@ -114,6 +113,7 @@ mod tests {
         // x = 0, 2, 3, 0 on the four intervals.
         let profile = [0.0, 2.0, 3.0, 0.0].iter().flat_map(|x| [*x; 3]).collect();
         let cycle = Cycle {
+            points: crate::problem::gauss::Points::Gauss,
             period: 1.0,
             forcing_periods: 0,
             mesh: vec![0.0, 0.2, 0.3, 0.6, 1.0].into(),

@@ -21,7 +21,6 @@
 use super::grazing::Extremum;
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
-use crate::problem::gauss::Scheme;
 
 /// Value of a switch, relative to its largest along the cycle, on its surface.
 const ON_SURFACE: f64 = 1e-8;
@@ -113,7 +112,7 @@ impl Monitor for Sliding<'_> {
 
 /// The arrivals of a cycle at the surface of a switch. Its profile has a mesh node at each of them.
 fn arrivals(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: usize) -> Vec<Arrival> {
-    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     if n == 0 || intervals < 2 {
         return Vec::new();
     }
@@ -158,7 +157,7 @@ fn arrivals(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: 
 /// would be had the orbit gone on without the jump, to second order in the speed of arrival. It passes zero where the
 /// orbit only touches the surface (grazing-sliding).
 pub(super) fn touches(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: usize) -> Vec<Extremum> {
-    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     let mut found = Vec::new();
     for arrival in arrivals(field, parameters, cycle, switch).iter().filter(|arrival| arrival.slides()) {
         let [speed, _] = arrival.speeds;

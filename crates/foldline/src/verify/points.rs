@@ -11,7 +11,6 @@ use crate::diagram::{Branch, Cycle, Ending, Kind, Point, Solution};
 use crate::explore::System;
 use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::Setting;
-use crate::problem::gauss::Scheme;
 use crate::special::normal_form::Local;
 use crate::special::sliding;
 use num_complex::Complex64;
@@ -409,7 +408,7 @@ impl Path {
 
     /// Largest distance of a profile from the path, relative to `scales`.
     fn off(&self, cycle: &Cycle, scales: &[f64]) -> f64 {
-        let (scheme, count) = (Scheme::new(cycle.degree), self.times.len());
+        let (scheme, count) = (cycle.scheme(), self.times.len());
         let mut x = vec![0.0; scales.len()];
         let mut most = 0.0;
         for (k, t) in self.times.iter().enumerate() {

@@ -126,7 +126,15 @@ fn profile(integrator: &Integrator, start: &[f64], period: f64) -> Option<Cycle>
             profile.extend_from_slice(&x);
         }
     }
-    Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile, gain: Vec::new() })
+    Some(Cycle {
+        points: crate::problem::gauss::Points::Gauss,
+        period,
+        forcing_periods: 0,
+        mesh: mesh.into(),
+        degree: 4,
+        profile,
+        gain: Vec::new(),
+    })
 }
 
 fn point(solution: Solution, spectrum: Vec<Complex64>, unstable: usize, ranges: Vec<[f64; 2]>) -> Point {

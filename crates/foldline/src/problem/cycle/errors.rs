@@ -187,6 +187,10 @@ impl CycleProblem<'_> {
             return self.locally_corrected(u, &better, &known.within, switched);
         }
         let plain = self.transitions();
+        if self.is_damped() {
+            let finer = [self.finer_transitions(u, None)?, self.finer_transitions(&better, Some(&known.within))?];
+            return self.spectra_of(&plain, &finer, [u, &better]);
+        }
         let mut transitions = [plain.clone(), plain.clone()];
         let profiles = [Profile { u, without: None }, Profile { u: &better, without: Some(&known.within) }];
         let room = &mut *self.room.borrow_mut();
@@ -210,10 +214,20 @@ impl CycleProblem<'_> {
                 transitions[j * square..(j + 1) * square].copy_from_slice(&refined);
             }
         }
-        let [frames, others] = [u, &better].map(|u| self.frames(u));
+        self.spectra_of(&plain, &[own, other], [u, &better])
+    }
+
+    /// Multipliers from given transitions and those improved in two ways, in the even intervals first.
+    fn spectra_of(
+        &self,
+        plain: &[f64],
+        [own, other]: &[Vec<f64>; 2],
+        profiles: [&[f64]; 2],
+    ) -> Option<[Vec<Complex64>; 4]> {
+        let [frames, others] = profiles.map(|u| self.frames(u));
+        let (own, other) = (&own[..], &other[..]);
         // Transitions of the even and of the odd intervals, and frames.
-        let courses =
-            [(&own, &plain, &frames), (&own, &own, &frames), (&other, &own, &frames), (&other, &other, &others)];
+        let courses = [(own, plain, &frames), (own, own, &frames), (other, own, &frames), (other, other, &others)];
         let courses =
             courses.map(|(even, odd, frames)| floquet::Course { transitions: [even, odd], frames: frames.as_ref() });
         let found = floquet::several(courses, &self.scale)?.map(|found| found.multipliers);
@@ -279,8 +293,11 @@ impl CycleProblem<'_> {
         let measure = |field: &dyn VectorField, profile: &[f64], mesh: &[f64]| {
             self.defect(field, &parameters, profile, mesh, u[size], &scale)
         };
-        let Defect { mut local, mut within, mut ends, mut sources, mut misses } =
-            measure(self.setting.field, &u[..size], &self.mesh);
+        let mut whole = measure(self.setting.field, &u[..size], &self.mesh);
+        if self.is_damped() {
+            self.damp(u, &scale, &mut whole);
+        }
+        let Defect { mut local, mut within, mut ends, mut sources, mut misses } = whole;
         // An interval in which the orbit switches has the defects of its parts, but where a part is divided, the error
         // of the whole: the divisions are no part of the mesh, and without them the interval may be too long.
         let (n, inner, count) = (self.n, self.scheme.degree * self.n, self.intervals());
@@ -360,8 +377,20 @@ impl CycleProblem<'_> {
         rhs
     }
 
+    /// `[N][n]`: the flow at the left ends of intervals, relative to the scales.
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
         let (n, count, block) = (self.n, self.intervals(), (self.scheme.degree + 1) * self.n);
+        if self.is_damped() {
+            // The polynomials satisfy the equations there, and f itself is not accurate where it is stiff.
+            let m = self.scheme.degree;
+            let slopes = &self.scheme.derivative[(m - 1) * (m + 1)..];
+            let at = |j: usize, i: usize| {
+                let before = (j + count - 1) % count;
+                let rise: f64 = slopes.iter().enumerate().map(|(k, d)| d * u[before * block + k * n + i]).sum();
+                rise / (self.h(before) * u[self.profile_size()] * self.scale[i])
+            };
+            return (0..count * n).map(|k| at(k / n, k % n)).collect();
+        }
         let mut states = vec![0.0; n * count];
         for j in 0..count {
             for i in 0..n {

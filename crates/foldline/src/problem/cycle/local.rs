@@ -372,7 +372,7 @@ impl CycleProblem<'_> {
     /// [`super::errors`].
     fn finer_links(&self, u: &[f64], without: Option<&[f64]>, local: &Localised) -> Option<Vec<Link>> {
         let (n, m, block, size) = (self.n, self.scheme.degree, self.block(), self.profile_size());
-        let finer = Scheme::of(m + 1);
+        let finer = Scheme::at(m + 1, self.scheme.points);
         let weights = Weights { integration: &finer.integration, end: &finer.end };
         let (common, structure) = (local.system.common(), &local.structure);
         // The parameters are those of the solution: J belongs to them.

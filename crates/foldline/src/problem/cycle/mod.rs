@@ -39,6 +39,7 @@ mod open;
 mod phase;
 mod residual;
 mod segment;
+mod stages;
 #[cfg(test)]
 mod tests_local;
 
@@ -56,6 +57,7 @@ use crate::stability::floquet::{self, Course, Floquet, Frames};
 pub(in crate::problem) use errors::spectrum_difference;
 use errors::{Measured, Room};
 use num_complex::Complex64;
+pub(in crate::problem) use stages::GROWTH;
 use std::cell::RefCell;
 use std::sync::Arc;
 
@@ -135,7 +137,12 @@ pub struct CycleProblem<'a> {
 impl<'a> CycleProblem<'a> {
     /// Cycles represented by polynomials of degree `degree` on `mesh`.
     pub fn new(setting: Setting<'a>, degree: usize, mesh: &Mesh) -> CycleProblem<'a> {
-        let scheme = Scheme::new(degree);
+        CycleProblem::with(setting, Scheme::of(degree), mesh)
+    }
+
+    /// Cycles in a collocation scheme on `mesh`.
+    pub fn with(setting: Setting<'a>, scheme: &Scheme, mesh: &Mesh) -> CycleProblem<'a> {
+        let scheme = scheme.clone();
         let n = setting.field.dim();
         let conditions = setting.field.conditions();
         // Integral conditions in place of conditions on the ends need scalars that are not in use.
@@ -180,9 +187,9 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
-    /// Cycles with the degree, the mesh, the number of forcing periods and the rotations of `cycle`.
+    /// Cycles with the scheme, the mesh, the number of forcing periods and the rotations of `cycle`.
     pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
-        let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
+        let mut problem = CycleProblem::with(setting, cycle.scheme(), &cycle.mesh);
         problem.forcing_periods = cycle.forcing_periods;
         // The ends of a boundary-value problem are related by its conditions alone.
         problem.gain = if problem.is_open() { Vec::new() } else { cycle.gain.clone() };
@@ -818,6 +825,7 @@ impl ZeroProblem for CycleProblem<'_> {
         Point {
             position: 0,
             solution: Solution::Cycle(Cycle {
+                points: self.scheme.points,
                 period: u[size] * self.setting.field.time_unit(&parameters),
                 forcing_periods: self.forcing_periods,
                 mesh,
@@ -846,7 +854,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         let (mut u, period) = match &point.solution {
-            Solution::Cycle(cycle) => (cycle.profile.clone(), cycle.period),
+            Solution::Cycle(cycle) => (cycle.clone().with_points(self.scheme.points).profile, cycle.period),
             Solution::Equilibrium(x) => (x.iter().copied().cycle().take(self.profile_size()).collect(), 1.0),
             Solution::Torus(torus) => (vec![f64::NAN; self.profile_size()], torus.period),
         };

@@ -229,7 +229,15 @@ mod tests {
             .flat_map(|j| scheme.nodes.iter().map(move |c| (j as f64 + c) / intervals as f64).collect::<Vec<_>>());
         let turned = times.map(|t| std::f64::consts::TAU * (t + phase));
         let profile = turned.flat_map(|a| [a.sin() + 0.5 * (3.0 * a).sin(), a.cos()]).collect();
-        Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(intervals), degree: 4, profile, gain: Vec::new() }
+        Cycle {
+            points: crate::problem::gauss::Points::Gauss,
+            period: 2.0,
+            forcing_periods: 0,
+            mesh: mesh::uniform(intervals),
+            degree: 4,
+            profile,
+            gain: Vec::new(),
+        }
     }
 
     #[test]
@@ -241,8 +249,15 @@ mod tests {
         let times = (0..90)
             .flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
         let profile = times.flat_map(|a| [(3.0 * a).sin() + 1e-3 * a.sin(), (3.0 * a).cos()]).collect();
-        let turns =
-            Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile, gain: Vec::new() };
+        let turns = Cycle {
+            points: crate::problem::gauss::Points::Gauss,
+            period: 2.0,
+            forcing_periods: 0,
+            mesh: mesh::uniform(90),
+            degree: 4,
+            profile,
+            gain: Vec::new(),
+        };
         let mut problem = CycleProblem::like(setting, &turns);
         let beside: Vec<f64> = turns.profile.iter().copied().chain([2.0, 1.0]).collect();
         problem.anchor(&beside);

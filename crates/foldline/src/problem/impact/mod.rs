@@ -120,6 +120,7 @@ impl<'a> ImpactProblem<'a> {
     /// A boundary-value problem on a mesh.
     fn fresh(&self, mesh: &Mesh) -> CycleProblem<'_> {
         let cycle = Cycle {
+            points: crate::problem::gauss::Points::Gauss,
             period: 1.0,
             forcing_periods: 1,
             mesh: mesh.clone(),

@@ -59,7 +59,7 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
     if field.event_count() == 0 || count == 0 || cycle.degree == 0 || cycle.profile.is_empty() {
         return Vec::new();
     }
-    let (scheme, block) = (Scheme::of(cycle.degree), (cycle.degree + 1) * n);
+    let (scheme, block) = (cycle.scheme(), (cycle.degree + 1) * n);
     let left = |j: usize| &cycle.profile[j % count * block..j % count * block + n];
     let mut sizes = vec![f64::MIN_POSITIVE; field.event_count()];
     for j in 0..count {
@@ -88,7 +88,7 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
 
 /// The cycle with a mesh node at a time, and the interval that ends there.
 pub(crate) fn with_node(cycle: &Cycle, t: f64) -> (Cycle, usize) {
-    let (n, scheme) = (cycle.dim(), Scheme::of(cycle.degree));
+    let (n, scheme) = (cycle.dim(), cycle.scheme());
     let block = (cycle.degree + 1) * n;
     let next = cycle.mesh.partition_point(|node| *node <= t).clamp(1, cycle.intervals());
     let [a, b] = [cycle.mesh[next - 1], cycle.mesh[next]];
@@ -142,7 +142,7 @@ impl Flights {
         if impacts.last()?.interval + 1 == count {
             impacts.rotate_right(1);
         }
-        let scheme = Scheme::of(cycle.degree);
+        let scheme = cycle.scheme();
         let forced = cycle.forcing_periods > 0;
         let unit = if forced { f64::from(cycle.forcing_periods) } else { cycle.period };
         let block = (cycle.degree + 1) * n;
@@ -290,7 +290,15 @@ impl Flights {
         mesh[0] = 0.0;
         mesh.push(1.0);
         let profile = pieces.into_iter().flat_map(|own| own.nodes).collect();
-        Cycle { period: whole * unit, forcing_periods, mesh: mesh.into(), degree, profile, gain: Vec::new() }
+        Cycle {
+            points: crate::problem::gauss::Points::Gauss,
+            period: whole * unit,
+            forcing_periods,
+            mesh: mesh.into(),
+            degree,
+            profile,
+            gain: Vec::new(),
+        }
     }
 }
 
