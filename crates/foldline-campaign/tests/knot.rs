@@ -63,8 +63,15 @@ fn sampled(system: &System, case: &Case, Place(omega, period, state): &Place) ->
             profile.extend_from_slice(&x);
         }
     }
-    let cycle =
-        Cycle { points: foldline::problem::gauss::Points::Gauss, period: *period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() };
+    let cycle = Cycle {
+        points: foldline::problem::gauss::Points::Gauss,
+        period: *period,
+        forcing_periods: 0,
+        mesh: mesh.into(),
+        degree: DEGREE,
+        profile,
+        gain: Vec::new(),
+    };
     Point {
         position: 0,
         parameters,

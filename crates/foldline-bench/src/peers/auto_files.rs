@@ -116,7 +116,15 @@ fn cycle(numbers: &[f64], n: usize, intervals: usize, degree: usize, period: f64
             profile.extend((0..n).map(value));
         }
     }
-    Cycle { points: foldline::problem::gauss::Points::Gauss, period, forcing_periods: 0, mesh: mesh.into(), degree, profile, gain: Vec::new() }
+    Cycle {
+        points: foldline::problem::gauss::Points::Gauss,
+        period,
+        forcing_periods: 0,
+        mesh: mesh.into(),
+        degree,
+        profile,
+        gain: Vec::new(),
+    }
 }
 
 /// Writes the file from which AUTO reads the first profile: times and states of a cycle, including both ends.

@@ -117,7 +117,15 @@ impl BackboneProblem {
         if let (Outcome::Reached, Some(last)) = (arrival.outcome, mesh.last_mut()) {
             *last = 1.0;
         }
-        Cycle { points: foldline::problem::gauss::Points::Gauss, period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() }
+        Cycle {
+            points: foldline::problem::gauss::Points::Gauss,
+            period,
+            forcing_periods: 0,
+            mesh: mesh.into(),
+            degree: DEGREE,
+            profile,
+            gain: Vec::new(),
+        }
     }
 }
 

@@ -54,6 +54,13 @@ pub struct Follow<'w> {
     pub inspected: f64,
 }
 
+impl Follow<'_> {
+    /// The same on another problem, from a new start.
+    pub fn on<'p>(&'p self, problem: &'p mut dyn ZeroProblem) -> Follow<'p> {
+        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, ..*self }
+    }
+}
+
 /// Step, in tolerances, below which it begins and ends on the same mesh, because two meshes agree to the tolerance
 /// only.
 pub(super) const SHORT: f64 = 200.0;

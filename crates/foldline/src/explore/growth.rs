@@ -2,12 +2,14 @@
 
 use super::counted::Counted;
 use super::plan::Holds;
+use super::repointed::{self, CHANGES};
 use super::symmetry::{is_rotating_wave, rotation};
 use super::{System, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::problem::gauss::Points;
 use crate::problem::impact::{ImpactProblem, stored::impacts};
 use crate::problem::map::MapProblem;
 use crate::problem::torus::TorusProblem;
@@ -605,7 +607,7 @@ impl Growth<'_> {
             tolerance: self.settings.tolerance,
         };
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
-        let (branch_free, free_cycles) = (branch.free, branch.held.is_none() && !system.field.forced());
+        let (line, free_cycles) = (self.line(branch), branch.held.is_none() && !system.field.forced());
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -629,6 +631,8 @@ impl Growth<'_> {
         let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
+        let repointed: RefCell<(usize, Option<Points>)> = RefCell::default();
+        let repoints = branch.held.is_none() && system.holds.is_none();
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
@@ -670,7 +674,13 @@ impl Growth<'_> {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
-                    before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
+                    let mut changes = repointed.borrow_mut();
+                    if repoints && changes.0 < CHANGES {
+                        changes.1 = repointed::better(self.system, &point);
+                    }
+                    before.is_none_or(|before| self.unexplained(branch, before, &point))
+                        && self.accept(branch, point)
+                        && changes.1.is_none()
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
@@ -708,22 +718,7 @@ impl Growth<'_> {
             let position = there.position + if side == 1 { 1 } else { -1 };
             next.point.position = position;
             record.replace(Record::at(&next.point, side == 1));
-            let mut walk = Follow {
-                problem: &mut *problem,
-                settings: self.settings,
-                monitors: &monitors,
-                marks: &marks,
-                collapses: &collapses,
-                limit: &|at| limits.approached(at).filter(|_| free_cycles),
-                corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
-                direction,
-                symmetric,
-                holds: false,
-                free: branch_free,
-                home: home.as_ref(),
-                homecoming: Homecoming::default(),
-                inspected: 0.0,
-            };
+            let mut walk = Follow { holds: false, ..walk.on(&mut *problem) };
             ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
                 true => Ending::Stopped,
                 false => follow(&mut walk, next, None, position.unsigned_abs() as usize, &mut sink),
@@ -732,6 +727,36 @@ impl Growth<'_> {
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
             return Ending::Stopped;
+        }
+        while let (changes, Some(points)) = repointed.take() {
+            let last = latest.borrow().clone();
+            let there = repointed::repointed(&last, points);
+            let mut problem = line.problem(&system, self.degree, &there);
+            let (next, home, stops) = match repointed::again(&mut *problem, self.settings, &there, direction) {
+                Ok(mut next) => {
+                    repointed.replace((changes + 1, None));
+                    next.point.position += if side == 1 { 1 } else { -1 };
+                    let stops = sink(Item::Point(next.point.clone())) == Verdict::Stop;
+                    (next, home.as_ref().map(|home| repointed::repointed(home, points)), stops)
+                }
+                Err(_) => {
+                    repointed.replace((CHANGES, None));
+                    problem = line.problem(&system, self.degree, &last);
+                    match revived(&mut *problem, self.settings, &last, direction) {
+                        Ok(next) => (next, home.clone(), false),
+                        Err(why) => return Ending::NoStart(why.to_string()),
+                    }
+                }
+            };
+            let position = next.point.position.unsigned_abs() as usize;
+            let mut walk = Follow { home: home.as_ref(), ..walk.on(&mut *problem) };
+            ending = match stops {
+                true => Ending::Stopped,
+                false => follow(&mut walk, next, None, position, &mut sink),
+            };
+            if self.observer.stopping() {
+                return Ending::Stopped;
+            }
         }
         match ending {
             Ending::StepTooSmall(why) if branch.is_connecting() => {

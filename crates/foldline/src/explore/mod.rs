@@ -57,6 +57,7 @@ pub mod plan;
 mod profile;
 mod pursuit;
 pub mod recognised;
+mod repointed;
 mod resonances;
 mod responses;
 mod schedule;

@@ -18,9 +18,10 @@ use crate::diagram::Cycle;
 use crate::linalg::dense::MANY;
 use crate::stability::eigenvalues;
 
-/// T μ beyond which modes are fast. For m = 4 and the 20 intervals that a smooth cycle needs, (1) is then 1e-7, at the
-/// limit of the errors of multipliers; it grows quickly from there.
-const FAST: f64 = 1000.0;
+/// T μ beyond which modes are fast: 25 on each of the 20 intervals that a smooth cycle needs. (1) is then still far below
+/// the errors of multipliers, but their estimate at Gauss points inverts transitions within an interval, of which less
+/// than 1e-10 is left.
+const FAST: f64 = 500.0;
 
 /// Collocation points that suit a cycle, at most approximately known, with the given parameters of the model.
 pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle: &Cycle) -> Points {
@@ -56,5 +57,9 @@ pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle
         decay += h * modes.iter().fold(0.0, |most: f64, z| most.max(-z.re));
         unresolved |= modes.iter().any(|z| z.re.is_nan() || h * z.re > GROWTH);
     }
-    if decay > FAST && !unresolved { Points::Radau } else { cycle.points }
+    match (unresolved, decay > FAST) {
+        (true, _) => Points::Gauss,
+        (false, true) => Points::Radau,
+        (false, false) => cycle.points,
+    }
 }

@@ -84,7 +84,7 @@ impl Monitor for Shrinks<'_> {
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         if let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution)
-            && a.degree == b.degree
+            && (a.degree, a.points) == (b.degree, b.points)
             && mesh::same(&a.mesh, &b.mesh)
         {
             return on_one_mesh(a, b, &extents(reference, self.scales));
