@@ -119,7 +119,7 @@ class Solution:
 
     @cached_property
     def profile(self) -> Floats:
-        """Collocation values of a cycle, shape (N, m + 1, n): on each mesh interval the left end and the m Gauss points."""
+        """Collocation values of a cycle, shape (N, m + 1, n): on each mesh interval the left end and the m collocation points."""
         values, degree = self._native.profile()
         return floats(values, -1, degree + 1, len(self.model.states)) if degree else floats(values)
 

@@ -174,6 +174,7 @@ fn a_branch_started_within_a_cluster_of_special_points_closes() {
         direction: -1.0,
         free: 0,
         home: Some(&home),
+        first_period: home.solution.free_period(),
         homecoming: Homecoming::default(),
         inspected: 0.0,
     };

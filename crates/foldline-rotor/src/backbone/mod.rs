@@ -182,6 +182,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         direction: 1.0,
         free: 0,
         home: None,
+        first_period: begun.point.solution.free_period(),
         homecoming: Homecoming::default(),
         inspected: 0.0,
     };

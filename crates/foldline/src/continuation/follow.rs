@@ -48,6 +48,8 @@ pub struct Follow<'w> {
     pub free: usize,
     /// The point at which the run ends as closed when it returns there; `None` if the branch cannot close.
     pub home: Option<&'w Point>,
+    /// Period at which the branch began; `None` if it is not free.
+    pub first_period: Option<f64>,
     /// Closure detector; empty when a run begins.
     pub homecoming: Homecoming,
     /// Length of the step under inspection. What is significant along it is significant on its parts.
@@ -111,7 +113,7 @@ pub fn follow(
         let between = walk.between(&before, &left);
         walk.trail(&before, between)
     });
-    let first_period = walk.home.unwrap_or(&left.point).solution.free_period();
+    let first_period = walk.first_period;
     let mut stirred = left.slope().abs() > STANDS;
     let mut stand = (left.parameter(), emitted);
     let mut long = first_period.map(|first| LONG * first);

@@ -2,7 +2,7 @@
 
 use super::counted::Counted;
 use super::plan::Holds;
-use super::repointed::{self, CHANGES};
+use super::repointed;
 use super::symmetry::{is_rotating_wave, rotation};
 use super::{System, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
@@ -24,7 +24,7 @@ use crate::special::peak::Peak;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse, grazing, impact, sliding};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// The curve through a point that is to be followed.
 #[derive(Clone, Debug, Default)]
@@ -621,6 +621,7 @@ impl Growth<'_> {
             holds,
             free: branch.free,
             home: home.as_ref(),
+            first_period: branch.points.iter().min_by_key(|p| p.position.abs()).and_then(|p| p.solution.free_period()),
             homecoming: Homecoming::default(),
             inspected: 0.0,
         };
@@ -631,8 +632,8 @@ impl Growth<'_> {
         let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
-        let repointed: RefCell<(usize, Option<Points>)> = RefCell::default();
-        let repoints = branch.held.is_none() && system.holds.is_none();
+        let next_points: RefCell<Option<Points>> = RefCell::default();
+        let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
@@ -674,13 +675,11 @@ impl Growth<'_> {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
-                    let mut changes = repointed.borrow_mut();
-                    if repoints && changes.0 < CHANGES {
-                        changes.1 = repointed::better(self.system, &point);
-                    }
+                    let better = may_change.get().then(|| repointed::better(self.system, &point)).flatten();
+                    next_points.replace(better);
                     before.is_none_or(|before| self.unexplained(branch, before, &point))
                         && self.accept(branch, point)
-                        && changes.1.is_none()
+                        && better.is_none()
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
@@ -728,19 +727,20 @@ impl Growth<'_> {
         if self.observer.stopping() {
             return Ending::Stopped;
         }
-        while let (changes, Some(points)) = repointed.take() {
+        while let Some(points) = next_points.take() {
+            // A branch that has returned to Gauss points stays there.
+            may_change.set(points == Points::Radau);
             let last = latest.borrow().clone();
             let there = repointed::repointed(&last, points);
             let mut problem = line.problem(&system, self.degree, &there);
             let (next, home, stops) = match repointed::again(&mut *problem, self.settings, &there, direction) {
                 Ok(mut next) => {
-                    repointed.replace((changes + 1, None));
                     next.point.position += if side == 1 { 1 } else { -1 };
                     let stops = sink(Item::Point(next.point.clone())) == Verdict::Stop;
                     (next, home.as_ref().map(|home| repointed::repointed(home, points)), stops)
                 }
                 Err(_) => {
-                    repointed.replace((CHANGES, None));
+                    may_change.set(false);
                     problem = line.problem(&system, self.degree, &last);
                     match revived(&mut *problem, self.settings, &last, direction) {
                         Ok(next) => (next, home.clone(), false),

@@ -2,7 +2,8 @@
 //!
 //! **Idea.** A mode may become fast along a branch, or a fast one may begin to grow. Where the multipliers are doubtful,
 //! or the mesh is large, the choice of the collocation points is made anew; see [`crate::problem::stiffness`]. The branch
-//! then goes on from the same solution at the other points.
+//! then goes on from the same solution at the other points. On either side of its start it changes to Radau points at most
+//! once, and to Gauss points at most once.
 //!
 //! **Fails when** Newton's method does not converge at the other points; the branch then goes on at its own.
 
@@ -14,8 +15,6 @@ use crate::diagram::{Cost, Cycle, Point, Solution};
 use crate::problem::gauss::Points;
 use crate::problem::stiffness;
 
-/// Number of changes on one side of a branch, after which the last choice is kept.
-pub(super) const CHANGES: usize = 8;
 /// Error of the multipliers, and number of intervals, beyond which the points are put in question. Both only save the
 /// test where there is nothing to gain: smooth cycles have errors below 1e-6 on fewer than 100 intervals.
 const DOUBTFUL: f64 = 1e-3;

@@ -1,13 +1,14 @@
 //! Choice of the collocation points of a cycle.
 //!
 //! **Idea.** Gauss points are more accurate, but they do not damp modes that decay within an interval. On N intervals
-//! such a mode keeps the share R(-T μ / N)^N of itself over the period, with the rate of decay μ and R as in
-//! [`super::gauss`]; in truth it keeps e^{-T μ}. If T μ exceeds [`FAST`], Radau points are chosen, which damp every mode
-//! that decays; unless a mode grows within an interval, which they would damp too.
+//! such a mode keeps the share R(-z)^N of itself over the period, with z = T μ / N, the rate of decay μ, and R as in
+//! [`super::gauss`]; in truth it keeps e^{-T μ}. If z exceeds [`FAST`], Radau points are chosen, which damp every mode
+//! that decays; unless a mode grows within an interval, which they would damp too. A cycle that needs a fine mesh in any
+//! case, as spikes do, has a small z.
 //!
 //! **Equations.** With |R(-z)| ≈ e^{-2 m (m + 1) / z} for z ≫ m², the share left at Gauss points is
 //!
-//!   (1)  e^{-2 m (m + 1) N² / (T μ)}
+//!   (1)  e^{-2 m (m + 1) N / z}
 //!
 //! **Source.** hairer1996, §§IV.3, IV.5.
 
@@ -18,10 +19,15 @@ use crate::diagram::Cycle;
 use crate::linalg::dense::MANY;
 use crate::stability::eigenvalues;
 
-/// T μ beyond which modes are fast: 25 on each of the 20 intervals that a smooth cycle needs. (1) is then still far below
-/// the errors of multipliers, but their estimate at Gauss points inverts transitions within an interval, of which less
-/// than 1e-10 is left.
-const FAST: f64 = 500.0;
+/// z beyond which modes are fast. For m = 4 and the 20 intervals that a smooth cycle needs, (1) is then still far below
+/// the errors of multipliers, but their estimate at Gauss points inverts transitions within an interval, of which only
+/// e^{-z} = 1e-11 is left.
+const FAST: f64 = 25.0;
+/// z, as a share of [`FAST`], below which a cycle at Radau points returns to Gauss points. Empirical, as the next constant.
+const SLOW: f64 = 0.25;
+/// Share of [`GROWTH`] up to which Radau points are chosen for a cycle at Gauss points. Empirical: the next meshes have
+/// intervals of up to twice to three times the length, on which they should not have to be given up again.
+const AHEAD: f64 = 0.25;
 
 /// Collocation points that suit a cycle, at most approximately known, with the given parameters of the model.
 pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle: &Cycle) -> Points {
@@ -50,16 +56,18 @@ pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle
     field.linearise(batch, &[], &mut f, &mut fx, &mut []);
     let period = if periods > 0.0 { periods } else { cycle.period };
     let (mut decay, mut unresolved) = (0.0, false);
+    let most = GROWTH * if cycle.points == Points::Radau { 1.0 } else { AHEAD };
     for j in 0..intervals {
         let h = cycle.mesh[j + 1] - cycle.mesh[j];
         let jacobian: Vec<f64> = (0..n * n).map(|at| period * fx[at * intervals + j]).collect();
         let modes = eigenvalues(&jacobian, n, scales);
         decay += h * modes.iter().fold(0.0, |most: f64, z| most.max(-z.re));
-        unresolved |= modes.iter().any(|z| z.re.is_nan() || h * z.re > GROWTH);
+        unresolved |= modes.iter().any(|z| z.re.is_nan() || h * z.re > most);
     }
-    match (unresolved, decay > FAST) {
-        (true, _) => Points::Gauss,
-        (false, true) => Points::Radau,
-        (false, false) => cycle.points,
+    let z = decay / intervals as f64;
+    match cycle.points {
+        Points::Gauss if z > FAST && !unresolved => Points::Radau,
+        Points::Radau if z < SLOW * FAST || unresolved => Points::Gauss,
+        points => points,
     }
 }
