@@ -5,7 +5,6 @@ use crate::model::outputs_at;
 use foldline::attractors::{signed_spectrum, spectral_ratio};
 use foldline::contract::VectorField;
 use foldline::diagram::{self, Cycle, Point};
-use foldline::problem::gauss::Scheme;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;

@@ -183,6 +183,7 @@ fn reference(rotor: &OverhungRotor, ratio: Ratio) -> Point {
     Point {
         parameters: parameters.to_vec(),
         solution: Solution::Cycle(Cycle {
+            points: foldline::problem::gauss::Points::Gauss,
             period,
             forcing_periods: 0,
             mesh: mesh.into(),

@@ -25,7 +25,15 @@ fn cycle(base: f64, lines: &[(i32, f64, f64)]) -> Cycle {
             profile.extend([part(0.0, false), part(-quarter, false), part(quarter, true), part(0.0, true)]);
         }
     }
-    Cycle { points: foldline::problem::gauss::Points::Gauss, period, forcing_periods: 0, mesh, degree, profile, gain: Vec::new() }
+    Cycle {
+        points: foldline::problem::gauss::Points::Gauss,
+        period,
+        forcing_periods: 0,
+        mesh,
+        degree,
+        profile,
+        gain: Vec::new(),
+    }
 }
 
 #[test]

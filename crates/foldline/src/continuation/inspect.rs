@@ -86,8 +86,7 @@ impl Follow<'_> {
     /// A step that enters or leaves a vertical branch, for instance at the amplitude at which a stop is first touched,
     /// has one end in the family. `stands` is true if the preceding step lay in it.
     fn fold_test(&self, [left, right]: [&Station; 2], length: f64, stands: bool) -> FoldTest {
-        let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
-        let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
+        let certain = left.point.unstable == right.point.unstable && is_far(&left.point) && is_far(&right.point);
         let slope = left.slope().abs().max(right.slope().abs());
         let unseen = UNSEEN * self.settings.tolerance;
         if left.mesh.is_empty() {
@@ -128,6 +127,9 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
+        // Where all multipliers are far from the unit circle and none of their digits is known, none is seen to pass it.
+        let unknown = |station: &Station| station.point.trust.spectrum.is_nan() && is_far(&station.point);
+        let doubtful = !left.mesh.is_empty() && unknown(left) && unknown(right);
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -189,6 +191,7 @@ impl Follow<'_> {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
+                Ok(_) if jump > 0 && doubtful => lost = true,
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
@@ -666,6 +669,11 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
 /// Change of the parameter, in tolerances, along a step of length at most 1 that the errors of both ends can produce.
 /// Empirical: a share of the tolerance, which bounds the error of a point.
 const UNSEEN: f64 = 0.2;
+/// True if no multiplier is close to the unit circle.
+fn is_far(point: &Point) -> bool {
+    point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL)
+}
+
 /// Modulus of the logarithm of a multiplier beyond which one step does not bring it to 1: a safety factor of e³ = 20.
 const CRITICAL: f64 = 3.0;
 
