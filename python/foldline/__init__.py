@@ -14,10 +14,12 @@ from importlib.metadata import version as _version
 
 from ._basins import Basins, basins
 from ._branch import Branch, SpecialPoint, SpecialPoints
+from ._case import Case
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
 from ._ensemble import Ensemble, ensemble
 from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._maps import latin_hypercube, map
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._rotor import rotor
@@ -40,6 +42,7 @@ __all__ = [
     "Band",
     "Basins",
     "Branch",
+    "Case",
     "Derivative",
     "DeviceError",
     "Diagram",
@@ -68,6 +71,8 @@ __all__ = [
     "follow",
     "hold",
     "homotopy",
+    "latin_hypercube",
+    "map",
     "model",
     "open",
     "rescued",
@@ -80,5 +85,5 @@ __all__ = [
 ]
 
 # The module from which they are imported, which tracebacks show.
-for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
+for _class in [globals()[own] for own in __all__ if isinstance(globals()[own], type)]:
     _class.__module__ = __name__

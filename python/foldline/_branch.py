@@ -158,8 +158,9 @@ class SpecialPoints(Sequence[SpecialPoint]):
     (1, 1, 0)
     """
 
-    def __init__(self, found: Sequence[SpecialPoint]) -> None:
+    def __init__(self, found: Sequence[SpecialPoint], kind: str = "") -> None:
         self._found = list(found)
+        self._kind = kind
 
     @overload
     def __getitem__(self, index: int) -> SpecialPoint: ...
@@ -168,7 +169,9 @@ class SpecialPoints(Sequence[SpecialPoint]):
     def __getitem__(self, index: int | slice | str) -> SpecialPoint | SpecialPoints:
         if isinstance(index, str):
             kind = index.replace("_", "-")
-            return SpecialPoints([own for own in self._found if own.kind == kind])
+            return SpecialPoints([own for own in self._found if own.kind == kind], kind)
+        if isinstance(index, int) and not -len(self._found) <= index < len(self._found):
+            raise IndexError(f"there are {len(self._found)} special points{f' of the kind {self._kind}' * bool(self._kind)}, and not one of index {index}")
         found = self._found[index]
         return SpecialPoints(found) if isinstance(found, list) else found
 

@@ -1,0 +1,198 @@
+"""Engines that compute the cells of a map over parameters: threads of this machine, or the workers of a cluster.
+
+An engine hands over answers as they come; nothing depends on their order.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any
+
+from ._cells import Cell, Done, Job, computed, failed, sentence, version
+from ._errors import ArgumentError, Error
+
+#: Called with each answer, and whether it may be stored.
+Deliver = Callable[[Done, bool], None]
+
+#: Largest fraction of the time of a worker that a task may cost beside the cells in it.
+COST = 0.05
+#: Largest fraction of the time of the scheduler that a map may take.
+LOAD = 0.5
+#: Longest time of a group, in seconds: what is lost with a worker.
+LONGEST = 60.0
+#: Groups that each thread has at the end of a map, at least, so that none waits long for the last one.
+EVEN = 4
+#: Number of times that a group is submitted again after its result was lost.
+TRIES = 3
+
+
+def group_size(task: float, cell: float, threads: int, left: int) -> int:
+    """Returns how many cells to compute in one task.
+
+    A task costs the scheduler the time `task`, one after the other for all threads, and each thread no more than that. With g cells that
+    take the time `cell` each, the cost to a thread is task/(g cell), and the scheduler is busy for threads task/(g cell) of the time.
+    """
+    cell = max(cell, 1e-6)
+    least = task / cell * max(1.0 / COST, threads / LOAD)
+    most = max(min(LONGEST / cell, left / (EVEN * threads)), least / EVEN)
+    return max(1, min(math.ceil(least), math.floor(most), left))
+
+
+class Threads:
+    """Threads of this process. The compiled half releases the interpreter's lock."""
+
+    def __init__(self, job: Job, jobs: int) -> None:
+        self.job = job
+        self.threads = jobs
+        self.tasks = 0
+
+    def compute(self, cells: Sequence[Cell], deliver: Deliver) -> None:
+        """Computes cells."""
+        self.tasks += len(cells)
+        if self.threads == 1 or len(cells) == 1:
+            for cell in cells:
+                deliver(self.job.at(cell), True)
+            return
+        pool = ThreadPoolExecutor(self.threads, thread_name_prefix="foldline-map")
+        rest = iter(cells)
+        running: set[Future[Done]] = set()
+        try:
+            while True:
+                while len(running) < 2 * self.threads and (cell := next(rest, None)) is not None:
+                    running.add(pool.submit(self.job.at, cell))
+                if not running:
+                    break
+                ended, running = wait(running, timeout=0.2, return_when=FIRST_COMPLETED)
+                for future in ended:
+                    deliver(future.result(), True)
+        finally:
+            # After Ctrl-C the cells in progress are abandoned.
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+class Cluster:
+    """Workers of `dask.distributed`. The size of groups follows from the times of the first cells."""
+
+    def __init__(self, job: Job, client: Any) -> None:
+        import cloudpickle
+
+        self.client = client
+        try:
+            self.payload: bytes = cloudpickle.dumps(job)
+        except Exception as error:
+            cure = "a function that refers to no files, locks, solutions of `settle` or open connections"
+            raise ArgumentError(f"the map cannot be sent to workers: {sentence(error)}\n  help: {cure}") from error
+        self.tasks = 0
+        self.task = 0.0
+        self._spent, self._count = 0.0, 0
+        self._counted, self._threads = -math.inf, 1
+
+    @property
+    def threads(self) -> int:
+        """Number of threads of all workers at present; at least 1."""
+        now = time.monotonic()
+        if now - self._counted > 2.0:
+            self._threads = max(sum(self.client.nthreads().values()), 1)
+            self._counted = now
+        return self._threads
+
+    def _prepare(self) -> None:
+        """Checks the workers, and measures what a task costs."""
+        from . import __version__
+
+        for _ in range(2):
+            start = time.perf_counter()
+            tried = [self.client.submit(version, self.payload, pure=False) for _ in range(min(4 * self.threads, 64))]
+            try:
+                found = set(self.client.gather(tried))
+            except Exception as error:
+                cure = "the same environment on all machines; modules of your own with client.upload_file('module.py')"
+                raise ArgumentError(f"the workers cannot compute this map: {sentence(error)}\n  help: {cure}") from error
+            self.task = (time.perf_counter() - start) / len(tried)
+        if found != {f"foldline {__version__}"}:
+            message = f"the workers have {', '.join(sorted(found))}, and this machine has foldline {__version__}"
+            raise ArgumentError(f"{message}\n  help: the same version on all machines")
+
+    def compute(self, cells: Sequence[Cell], deliver: Deliver) -> None:
+        """Computes cells."""
+        from distributed import as_completed
+
+        if not self.task:
+            self._prepare()
+        queue = list(reversed(cells))
+        groups: dict[Any, tuple[list[Cell], int]] = {}
+        answers = as_completed(with_results=True, raise_errors=False)
+        again: list[tuple[list[Cell], int]] = []
+
+        def submit() -> None:
+            while (queue or again) and len(groups) < 2 * self.threads:
+                group, tries = again.pop() if again else (self._taken(queue), 0)
+                future = self.client.submit(computed, self.payload, group, pure=False)
+                groups[future.key] = group, tries
+                self.tasks += 1
+                answers.add(future)
+
+        try:
+            submit()
+            while groups:
+                for future, found in answers.next_batch():
+                    group, tries = groups.pop(future.key)
+                    if future.status == "finished":
+                        self._hand_over(found, deliver)
+                    else:
+                        again += self._lost(group, tries, future, found, deliver)
+                    future.release()
+                submit()
+        finally:
+            if groups:
+                self.client.cancel([own for own in list(answers.futures) if own.key in groups])
+
+    def _taken(self, queue: list[Cell]) -> list[Cell]:
+        size = group_size(self.task, self._spent / self._count, self.threads, len(queue)) if self._count else 1
+        return [queue.pop() for _ in range(size)]
+
+    def _hand_over(self, found: Sequence[Done], deliver: Deliver) -> None:
+        for done in found:
+            self._spent += done[2]
+            self._count += 1
+            deliver((tuple(done[0]), done[1], done[2]), True)
+
+    def _lost(self, group: list[Cell], tries: int, future: Any, found: Any, deliver: Deliver) -> list[tuple[list[Cell], int]]:
+        """Returns what to submit again in place of a group without a result."""
+        from distributed import KilledWorker
+
+        error = found[1] if isinstance(found, tuple) and len(found) == 3 else found
+        killed = isinstance(error, KilledWorker)
+        if future.status == "error" and not killed:
+            message = sentence(error) if isinstance(error, BaseException) else str(error)
+            raise Error(f"a worker failed outside the cells: {message}\n  help: the logs of the workers, client.get_worker_logs()")
+        if killed and len(group) > 1:
+            # One of these cells may end every worker that computes it: each is tried alone.
+            return [([cell], 0) for cell in group]
+        if not killed and tries < TRIES:
+            return [(group, tries + 1)]
+        why = "the workers that computed this cell were lost" if killed else "the result of this cell was lost with its worker"
+        for cell in group:
+            deliver((cell, failed(f"{why}, {TRIES + 1} times"), 0.0), False)
+        return []
+
+
+def engine_of(job: Job, client: Any, jobs: int) -> Threads | Cluster:
+    """Returns the engine for a client of dask, or for threads if there is none."""
+    if client is None:
+        return Threads(job, jobs)
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise ImportError('a map on a cluster needs dask.distributed: pip install "foldline[cluster]"') from error
+    call = "client=Client(cluster), where Client is that of dask.distributed"
+    if not isinstance(client, Client):
+        raise ArgumentError(f"client must be a client of dask.distributed, but got a value of type {type(client).__name__}\n  help: {call}")
+    if client.asynchronous:
+        raise ArgumentError("the client is asynchronous\n  help: Client(cluster) without asynchronous=True")
+    if client.status != "running":
+        raise ArgumentError(f"the client is {client.status}\n  help: {call}")
+    return Cluster(job, client)
