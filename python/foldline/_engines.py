@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any
@@ -27,6 +28,10 @@ LONGEST = 60.0
 EVEN = 4
 #: Number of times that a group is submitted again after its result was lost.
 TRIES = 3
+#: Seconds between looks for answers, and without any before the workers are counted.
+PAUSE, ALONE = 0.002, 30.0
+#: Reason why a cell has no value whose workers died several times, each time while nothing else was computed.
+KILLED = "every worker that computed this cell died"
 
 
 def group_size(task: float, cell: float, threads: int, left: int) -> int:
@@ -118,37 +123,65 @@ class Cluster:
 
     def compute(self, cells: Sequence[Cell], deliver: Deliver) -> None:
         """Computes cells."""
-        from distributed import as_completed
-
         if not self.task:
             self._prepare()
-        queue = list(reversed(cells))
+        suspects: list[Cell] = []
+        self._all(list(reversed(cells)), 2, deliver, suspects.append)
+        # Workers that died had several tasks each. A cell that still ends workers when nothing else is computed is guilty.
+        for cell in suspects:
+            self._all([cell], 0, deliver, lambda cell: deliver((cell, failed(KILLED), 0.0), False))
+
+    def _all(self, queue: list[Cell], ahead: int, deliver: Deliver, killed: Callable[[Cell], None]) -> None:
+        """Computes the cells of a queue, with so many tasks ahead for each thread; hands over those whose workers died."""
+        from distributed import KilledWorker, as_completed
+
         groups: dict[Any, tuple[list[Cell], int]] = {}
-        answers = as_completed(with_results=True, raise_errors=False)
         again: list[tuple[list[Cell], int]] = []
-
-        def submit() -> None:
-            while (queue or again) and len(groups) < 2 * self.threads:
-                group, tries = again.pop() if again else (self._taken(queue), 0)
-                future = self.client.submit(computed, self.payload, group, pure=False)
-                groups[future.key] = group, tries
-                self.tasks += 1
-                answers.add(future)
-
+        answers = as_completed(with_results=True, raise_errors=False)
         try:
-            submit()
-            while groups:
-                for future, found in answers.next_batch():
+            while queue or again or groups:
+                while (queue or again) and len(groups) < max(ahead * self.threads, 1):
+                    group, tries = again.pop() if again else (self._taken(queue), 0)
+                    future = self.client.submit(computed, self.payload, group, pure=False)
+                    groups[future.key] = group, tries
+                    self.tasks += 1
+                    answers.add(future)
+                for future, found in self._ended(answers):
                     group, tries = groups.pop(future.key)
+                    error = found[1] if isinstance(found, tuple) and len(found) == 3 else found
                     if future.status == "finished":
                         self._hand_over(found, deliver)
+                    elif future.status != "error" and tries < TRIES:
+                        again.append((group, tries + 1))
+                    elif future.status != "error":
+                        for cell in group:
+                            deliver((cell, failed(f"the result was lost {tries + 1} times, together with its worker"), 0.0), False)
+                    elif not isinstance(error, KilledWorker):
+                        message = sentence(error) if isinstance(error, BaseException) else str(error)
+                        raise Error(f"a worker failed outside the cells: {message}\n  help: client.get_worker_logs() shows the logs")
                     else:
-                        again += self._lost(group, tries, future, found, deliver)
+                        for cell in group:
+                            killed(cell)
                     future.release()
-                submit()
         finally:
             if groups:
                 self.client.cancel([own for own in list(answers.futures) if own.key in groups])
+
+    def _ended(self, answers: Any) -> list[tuple[Any, Any]]:
+        """Waits for answers; warns if there are no workers that could give any."""
+        last, warned = time.monotonic(), False
+        while True:
+            batch: list[tuple[Any, Any]] = answers.next_batch(block=False)
+            if batch:
+                return batch
+            time.sleep(PAUSE)
+            if self.client.status != "running":
+                raise Error(f"the client is {self.client.status}\n  help: with out= the answers so far are kept; repeat the call with a new client")
+            if time.monotonic() - last > ALONE and not warned:
+                last = time.monotonic()
+                if not self.client.nthreads():
+                    warned = True
+                    warnings.warn("the cluster has no workers; the map waits for new ones, and Ctrl-C ends it", stacklevel=2)
 
     def _taken(self, queue: list[Cell]) -> list[Cell]:
         size = group_size(self.task, self._spent / self._count, self.threads, len(queue)) if self._count else 1
@@ -159,25 +192,6 @@ class Cluster:
             self._spent += done[2]
             self._count += 1
             deliver((tuple(done[0]), done[1], done[2]), True)
-
-    def _lost(self, group: list[Cell], tries: int, future: Any, found: Any, deliver: Deliver) -> list[tuple[list[Cell], int]]:
-        """Returns what to submit again in place of a group without a result."""
-        from distributed import KilledWorker
-
-        error = found[1] if isinstance(found, tuple) and len(found) == 3 else found
-        killed = isinstance(error, KilledWorker)
-        if future.status == "error" and not killed:
-            message = sentence(error) if isinstance(error, BaseException) else str(error)
-            raise Error(f"a worker failed outside the cells: {message}\n  help: the logs of the workers, client.get_worker_logs()")
-        if killed and len(group) > 1:
-            # One of these cells may end every worker that computes it: each is tried alone.
-            return [([cell], 0) for cell in group]
-        if not killed and tries < TRIES:
-            return [(group, tries + 1)]
-        why = "the workers that computed this cell were lost" if killed else "the result of this cell was lost with its worker"
-        for cell in group:
-            deliver((cell, failed(f"{why}, {TRIES + 1} times"), 0.0), False)
-        return []
 
 
 def engine_of(job: Job, client: Any, jobs: int) -> Threads | Cluster:
