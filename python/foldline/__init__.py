@@ -19,6 +19,7 @@ from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
 from ._ensemble import Ensemble, ensemble
 from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._map_plot import draw
 from ._maps import latin_hypercube, map
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
@@ -29,6 +30,7 @@ from ._solution import Attractor, Attractors, Solution
 from ._strobe import Strobe, strobe
 from ._sweeps import survey, sweep
 from ._symbols import where
+from ._uncertainty import Spread, Uncertainty, uncertainty
 
 try:
     __version__ = _version("foldline")
@@ -60,12 +62,15 @@ __all__ = [
     "Solution",
     "SpecialPoint",
     "SpecialPoints",
+    "Spread",
     "Strobe",
     "Survey",
     "Sweep",
     "TraceError",
     "Trajectory",
+    "Uncertainty",
     "basins",
+    "draw",
     "ensemble",
     "explore",
     "follow",
@@ -81,6 +86,7 @@ __all__ = [
     "strobe",
     "survey",
     "sweep",
+    "uncertainty",
     "where",
 ]
 

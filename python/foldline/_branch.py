@@ -140,10 +140,21 @@ class SpecialPoint(Solution):
         given = spreads(diagram.model, parameters)
         return bands(*diagram._native.uncertainty(self.branch._index, self._index, given, samples))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _special_of, (self.branch, self._index)
+
     def __repr__(self) -> str:
         form = f", {self.normal_form}" if self.normal_form else ""
         error = self.error * (self.branch.scale + abs(self.value))
         return f"<{self.kind} of {self.branch.name} at {self.branch.free} = {self.value:.10g} ± {error:.1e}{form}>"
+
+
+def _special_of(branch: Branch, index: int) -> SpecialPoint:
+    return branch.special[index]
+
+
+def _branch_of(diagram: Diagram, index: int) -> Branch:
+    return diagram.branches[index]
 
 
 class SpecialPoints(Sequence[SpecialPoint]):
@@ -261,6 +272,9 @@ class Branch(Sequence[Solution]):
         self._ends: list[tuple[str, str, bool] | None] = parts["ends"]
         self.ends: tuple[str, str] = tuple("unfinished" if end is None else end[1] for end in self._ends)  # type: ignore[assignment]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _branch_of, (self.diagram, self._index)
+
     @property
     def complete(self) -> bool:
         """True if both sides ended as intended: at a bound, closed on itself, or joined to another branch."""
@@ -364,7 +378,9 @@ class Branch(Sequence[Solution]):
         place = index + self._count if index < 0 else index
         if not 0 <= place < self._count:
             raise IndexError(f"the branch {self.name} has {self._count} points")
-        return Solution(self.diagram._native.solution(self._index, False, place), self.diagram.model)
+        found = Solution(self.diagram._native.solution(self._index, False, place), self.diagram.model)
+        found._home = (self, place)
+        return found
 
     def __len__(self) -> int:
         return self._count

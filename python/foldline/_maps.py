@@ -24,6 +24,7 @@ from ._layout import Layout, layout_of
 from ._progress import _bar_of_cells, _watched
 from ._questions import Limits, Question, question_of
 from ._refining import Refined, refine
+from ._solution import Solution
 from ._studies import RESCUED, Path, _depth
 
 if TYPE_CHECKING:
@@ -131,6 +132,10 @@ def map(
     check_model(model, "foldline.map({}, over={...}, what='motions')")
     library()
     layout = layout_of(model, over)
+    if isinstance(start, Solution):
+        start = start.state
+    if start is not None and not isinstance(start, str):
+        start = model.state(start).tolist()
     own = Limits(start, whole("samples", samples), whole("seed", seed, 0), tolerable(tolerance), *limits(max_steps, max_time))
     question = question_of(what, model, own, layout.names)
     return mapped(

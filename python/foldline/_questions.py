@@ -49,8 +49,7 @@ class Limits:
 
     def identity(self) -> dict[str, Any]:
         """Returns what tells these settings from others."""
-        start = self.start if self.start is None or isinstance(self.start, str) else np.asarray(self.start, dtype=float).tolist()
-        return {"start": start, "samples": self.samples, "seed": self.seed, **self.options()}
+        return {"start": self.start, "samples": self.samples, "seed": self.seed, **self.options()}
 
 
 class Motions:
