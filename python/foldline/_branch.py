@@ -182,7 +182,9 @@ class SpecialPoints(Sequence[SpecialPoint]):
             kind = index.replace("_", "-")
             return SpecialPoints([own for own in self._found if own.kind == kind], kind)
         if isinstance(index, int) and not -len(self._found) <= index < len(self._found):
-            raise IndexError(f"there are {len(self._found)} special points{f' of the kind {self._kind}' * bool(self._kind)}, and not one of index {index}")
+            raise IndexError(
+                f"there are {len(self._found)} special points{f' of the kind {self._kind}' * bool(self._kind)}, and not one of index {index}"
+            )
         found = self._found[index]
         return SpecialPoints(found) if isinstance(found, list) else found
 

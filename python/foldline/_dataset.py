@@ -156,8 +156,10 @@ def only_category(texts: Iterable[str]) -> str:
         read = json.loads(text)
         if isinstance(read, dict):
             continue
-        names = [name for name, value in read[0].items() if isinstance(value, (str, bool))]
+        names = [str(name) for name, value in read[0].items() if isinstance(value, (str, bool))]
         if len(names) == 1:
             return names[0]
         raise InputError(f"by which value should the map be refined?\n  help: by=NAME, one of {', '.join(read[0])}")
-    raise InputError("no cell has a value, so the map cannot be refined\n  help: the reasons are in the variable `failure` of the map without refine=")
+    raise InputError(
+        "no cell has a value, so the map cannot be refined\n  help: the reasons are in the variable `failure` of the map without refine="
+    )

@@ -30,6 +30,8 @@ EVEN = 4
 TRIES = 3
 #: Seconds between looks for answers, and without any before the workers are counted.
 PAUSE, ALONE = 0.002, 30.0
+#: Number of tasks before the time of a cell is known, and seconds for which that is waited for.
+FIRST, WAIT = 32, 1.0
 #: Reason why a cell has no value whose workers died several times, each time while nothing else was computed.
 KILLED = "every worker that computed this cell died"
 
@@ -53,6 +55,8 @@ class Threads:
         self.job = job
         self.threads = jobs
         self.tasks = 0
+        # A thread costs nothing that could be measured.
+        self.task, self.prepared = 0.0, 0.0
 
     def compute(self, cells: Sequence[Cell], deliver: Deliver) -> None:
         """Computes cells."""
@@ -62,12 +66,12 @@ class Threads:
                 deliver(self.job.at(cell), True)
             return
         pool = ThreadPoolExecutor(self.threads, thread_name_prefix="foldline-map")
-        rest = iter(cells)
+        rest = list(reversed(cells))
         running: set[Future[Done]] = set()
         try:
             while True:
-                while len(running) < 2 * self.threads and (cell := next(rest, None)) is not None:
-                    running.add(pool.submit(self.job.at, cell))
+                while rest and len(running) < 2 * self.threads:
+                    running.add(pool.submit(self.job.at, rest.pop()))
                 if not running:
                     break
                 ended, running = wait(running, timeout=0.2, return_when=FIRST_COMPLETED)
@@ -91,9 +95,10 @@ class Cluster:
             cure = "a function that refers to no files, locks, solutions of `settle` or open connections"
             raise ArgumentError(f"the map cannot be sent to workers: {sentence(error)}\n  help: {cure}") from error
         self.tasks = 0
-        self.task = 0.0
+        self.task, self.prepared = 0.0, 0.0
         self._spent, self._count = 0.0, 0
         self._counted, self._threads = -math.inf, 1
+        self._heard = time.monotonic()
 
     @property
     def threads(self) -> int:
@@ -108,6 +113,8 @@ class Cluster:
         """Checks the workers, and measures what a task costs."""
         from . import __version__
 
+        found: set[str] = set()
+        begun = time.perf_counter()
         for _ in range(2):
             start = time.perf_counter()
             tried = [self.client.submit(version, self.payload, pure=False) for _ in range(min(4 * self.threads, 64))]
@@ -117,6 +124,7 @@ class Cluster:
                 cure = "the same environment on all machines; modules of your own with client.upload_file('module.py')"
                 raise ArgumentError(f"the workers cannot compute this map: {sentence(error)}\n  help: {cure}") from error
             self.task = (time.perf_counter() - start) / len(tried)
+        self.prepared = time.perf_counter() - begun
         if found != {f"foldline {__version__}"}:
             message = f"the workers have {', '.join(sorted(found))}, and this machine has foldline {__version__}"
             raise ArgumentError(f"{message}\n  help: the same version on all machines")
@@ -133,14 +141,16 @@ class Cluster:
 
     def _all(self, queue: list[Cell], ahead: int, deliver: Deliver, killed: Callable[[Cell], None]) -> None:
         """Computes the cells of a queue, with so many tasks ahead for each thread; hands over those whose workers died."""
-        from distributed import KilledWorker, as_completed
+        import distributed
 
+        dask: Any = distributed
         groups: dict[Any, tuple[list[Cell], int]] = {}
         again: list[tuple[list[Cell], int]] = []
-        answers = as_completed(with_results=True, raise_errors=False)
+        answers = dask.as_completed(with_results=True, raise_errors=False)
+        begun = time.monotonic()
         try:
             while queue or again or groups:
-                while (queue or again) and len(groups) < max(ahead * self.threads, 1):
+                while (queue or again) and len(groups) < self._ahead(ahead, time.monotonic() - begun):
                     group, tries = again.pop() if again else (self._taken(queue), 0)
                     future = self.client.submit(computed, self.payload, group, pure=False)
                     groups[future.key] = group, tries
@@ -156,7 +166,7 @@ class Cluster:
                     elif future.status != "error":
                         for cell in group:
                             deliver((cell, failed(f"the result was lost {tries + 1} times, together with its worker"), 0.0), False)
-                    elif not isinstance(error, KilledWorker):
+                    elif not isinstance(error, dask.KilledWorker):
                         message = sentence(error) if isinstance(error, BaseException) else str(error)
                         raise Error(f"a worker failed outside the cells: {message}\n  help: client.get_worker_logs() shows the logs")
                     else:
@@ -167,21 +177,30 @@ class Cluster:
             if groups:
                 self.client.cancel([own for own in list(answers.futures) if own.key in groups])
 
+    def _ahead(self, each: int, since: float) -> int:
+        """Number of tasks to have out. Few at first, so that the time of a cell is known before the others are grouped."""
+        most = max(each * self.threads, 1)
+        return most if self._count or since > WAIT else min(most, FIRST)
+
     def _ended(self, answers: Any) -> list[tuple[Any, Any]]:
-        """Waits for answers; warns if there are no workers that could give any."""
-        last, warned = time.monotonic(), False
+        """Waits for answers, or a second for the first one; warns if there are no workers that could give any."""
+        begun = time.monotonic()
         while True:
             batch: list[tuple[Any, Any]] = answers.next_batch(block=False)
+            now = time.monotonic()
             if batch:
+                self._heard = now
                 return batch
-            time.sleep(PAUSE)
+            if not self._count and now - begun > WAIT:
+                return []
             if self.client.status != "running":
-                raise Error(f"the client is {self.client.status}\n  help: with out= the answers so far are kept; repeat the call with a new client")
-            if time.monotonic() - last > ALONE and not warned:
-                last = time.monotonic()
+                cure = "with out= the answers so far are kept; repeat the call with a new client"
+                raise Error(f"the client is {self.client.status}\n  help: {cure}")
+            if now - self._heard > ALONE:
+                self._heard = now
                 if not self.client.nthreads():
-                    warned = True
                     warnings.warn("the cluster has no workers; the map waits for new ones, and Ctrl-C ends it", stacklevel=2)
+            time.sleep(PAUSE)
 
     def _taken(self, queue: list[Cell]) -> list[Cell]:
         size = group_size(self.task, self._spent / self._count, self.threads, len(queue)) if self._count else 1

@@ -39,7 +39,7 @@ class Kept:
                 raise RunFileError(f"{folder} holds a run, not a map over parameters\n  help: another folder")
             else:
                 _written(path, json.dumps(own, indent=1) + "\n")
-            self._file: IO[str] = open(os.path.join(folder, _LINES), "a", encoding="utf-8")  # noqa: SIM115
+            self._file: IO[str] = open(os.path.join(folder, _LINES), "a", encoding="utf-8")
         except OSError as error:
             raise RunFileError(f"{folder} cannot be used: {error}\n  help: a folder that can be written to") from error
         if self._torn:

@@ -89,7 +89,7 @@ def _line(axes: Any, found: Any, shown: Any, dim: str, items: list[Any], texts: 
     if texts:
         kinds = sorted({str(own) for own in shown.values})
         level = [kinds.index(str(own)) for own in shown.values]
-        for index, kind in enumerate(kinds):
+        for index in range(len(kinds)):
             here = np.array(level) == index
             axes.plot(x[here], np.full(here.sum(), index), "s", color=_AREAS[index % len(_AREAS)], markersize=5)
         axes.set_yticks(range(len(kinds)), [kind or "no value" for kind in kinds])
@@ -138,5 +138,3 @@ def _surface(axes: Any, found: Any, shown: Any, dims: list[str]) -> None:
         axes.contour(x, y, z, colors="white", linewidths=0.5)
     axes.figure.colorbar(surface, ax=axes, label=_label(found, str(shown.name)))
     axes.set_ylabel(_label(found, dims[1]))
-
-

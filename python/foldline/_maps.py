@@ -138,9 +138,10 @@ def map(
         start = model.state(start).tolist()
     own = Limits(start, whole("samples", samples), whole("seed", seed, 0), tolerable(tolerance), *limits(max_steps, max_time))
     question = question_of(what, model, own, layout.names)
-    return mapped(
+    found: xarray.Dataset = mapped(
         model, layout, question, client=client, out=out, jobs=jobs, depth=whole("refine", refine, 0), by=by, progress=progress
     )  # fmt: skip
+    return found
 
 
 def mapped(
@@ -249,6 +250,8 @@ class _Run:
             "threads": engine.threads,
             "elapsed_seconds": self._elapsed,
             "computing_seconds": self._computing,
+            "preparing_seconds": engine.prepared,
+            "task_seconds": engine.task,
         }
 
     def complain(self) -> None:
@@ -265,7 +268,9 @@ class _Run:
             more = f"; and {len(most) - 3} other reasons" if len(most) > 3 else ""
             count = sum(reasons.values())
             warnings.warn(
-                f"{count} of {len(self.used)} cells have no values: {said}{more}. See the variable `failure`", EndedShort, stacklevel=_depth()
+                f"{count} of {len(self.used)} cells have no values: {said}{more}. See the variable `failure`",
+                EndedShort,
+                stacklevel=_depth(),
             )
 
     def close(self) -> None:

@@ -104,9 +104,11 @@ class Shares:
         names = [kind_of(own) for own in found.attractors]
         kinds = sorted(set(names))
         # Fates of the samples as numbers of kinds; -1 did not settle, -2 escaped.
-        merged = np.array([kinds.index(names[fate]) if fate >= 0 else -2 if fate in (-2, -3) else -1 for fate in found.fates], dtype=np.int64)
+        merged = np.array(
+            [kinds.index(names[fate]) if fate >= 0 else -2 if fate in (-2, -3) else -1 for fate in found.fates], dtype=np.int64
+        )
         joined = Basins(found.model, [], found.samples, merged, None, found.x, found.y, found.cells, None)
-        items = {}
+        items: dict[str, dict[str, Any]] = {}
         for index, kind in enumerate(kinds):
             share, low, high = joined.share(index)
             if share > 0:
@@ -262,7 +264,7 @@ def _points(study: Any, model: Model, names: Sequence[str]) -> Points:
     tables = tables_of(study)
     check_replaceable(tables, names)
     # Mistakes in the study are found before anything is computed.
-    if not isinstance(study, Mapping) and not ("\n" in str(study)):
+    if not isinstance(study, Mapping) and "\n" not in str(study):
         _native.Study.read(os.fspath(study))
     tables = {name: own for name, own in tables.items() if name != "model"}
     parsed(study_at(tables, {name: model.parameters[name]["value"] for name in names}), model)

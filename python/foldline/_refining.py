@@ -86,7 +86,9 @@ class Refined:
         return found
 
 
-def refine(refined: Refined, answers: Mapping[Cell, str], category: Callable[[str], str], compute: Callable[[list[Cell]], None]) -> dict[Cell, str]:
+def refine(
+    refined: Refined, answers: Mapping[Cell, str], category: Callable[[str], str], compute: Callable[[list[Cell]], None]
+) -> dict[Cell, str]:
     """Refines until nothing is left to split; returns the category of every cell."""
     categories: dict[Cell, str] = {}
 

@@ -53,7 +53,7 @@ class Solution:
         """Pickles the branch on which it lies. A solution that lies on none cannot be pickled."""
         if self._home is None:
             cure = "a point of a branch, branch[0]; or send model and state, and let it settle again: model.settle(solution.state)"
-            raise TypeError(f"a {self.family} that lies on no branch cannot be pickled\n  help: {cure}")
+            raise TypeError(f"a solution that lies on no branch cannot be pickled\n  help: {cure}")
         return operator.getitem, self._home
 
     @property

@@ -16,8 +16,8 @@ from ._maps import CellProgress, mapped, unit_hypercube
 from ._model import Model
 from ._questions import Points
 from ._sensitivity import spreads as checked_spreads
-from ._study_at import check_replaceable, tables_of
 from ._studies import Path
+from ._study_at import check_replaceable, tables_of
 
 if TYPE_CHECKING:
     import pandas
@@ -120,9 +120,7 @@ class Uncertainty(Sequence[Spread]):
         """
         from ._tables import _pandas
 
-        rows = [
-            {**own._asdict(), "low": own.range[0], "high": own.range[1], "without": sum(own.without.values())} for own in self._rows
-        ]
+        rows = [{**own._asdict(), "low": own.range[0], "high": own.range[1], "without": sum(own.without.values())} for own in self._rows]
         columns = ["name", "free", "value", "first_order", "mean", "sigma", "low", "high", "samples", "without"]
         frame: pandas.DataFrame = _pandas().DataFrame(rows, columns=columns)
         return frame
@@ -247,7 +245,7 @@ def uncertainty(
     if not isinstance(spreads, Mapping) or not spreads:
         check_parameters("spreads", spreads)
         raise ArgumentError("no parameter is uncertain\n  help: {'zeta': 0.002} or {'zeta': (0.008, 0.012)}")
-    diagram = study.diagram if is_branch(study) else study
+    diagram: Any = study.diagram if is_branch(study) else study
     if not isinstance(diagram, Diagram):
         diagram = run(study, model, jobs=jobs)
     own = diagram.model
@@ -282,7 +280,9 @@ def _middle(diagram: Diagram, names: Mapping[str, Any]) -> dict[str, float]:
     return values
 
 
-def _drawn(spreads: Mapping[str, tuple[float, float | None]], middle: Mapping[str, float], count: int, seed: int) -> list[tuple[float, ...]]:
+def _drawn(
+    spreads: Mapping[str, tuple[float, float | None]], middle: Mapping[str, float], count: int, seed: int
+) -> list[tuple[float, ...]]:
     if not count:
         return []
     unit = unit_hypercube(len(spreads), count, seed)
