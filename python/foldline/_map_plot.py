@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from . import _native
 from ._arguments import suggestion, wrong_kind
-from ._axes import COLOURS, axes_or_new
+from ._arrays import Floats
+from ._axes import COLOURS, axes_or_new, label
 from ._errors import InputError
+from ._model import Model
 
 #: Colours of areas, distinguishable with all common types of colour vision.
 _AREAS = ("#56b4e9", "#e69f00", "#009e73", "#f0e442", "#cc79a7", "#0072b2", "#d55e00", "#999999")
@@ -74,8 +78,17 @@ def draw(found: Any, name: str | None = None, ax: Any = None, **where: str) -> A
 
 
 def _label(found: Any, name: str) -> str:
+    """An axis label as in diagrams, if the name is one of the model."""
+    model = _model_of(str(found.attrs.get("model_text", "")))
+    if model is not None and (name in model.parameters or name == "period" or name.rpartition("_")[2] in ("max", "min")):
+        return label(name, model)
     unit = found[name].attrs.get("units", "")
     return f"{name} [{unit}]" if unit not in ("", "1", "-") else name
+
+
+@lru_cache(maxsize=4)
+def _model_of(text: str) -> Model | None:
+    return Model(_native.Model.parse(text, "<model>")) if text else None
 
 
 def _without(found: Any) -> Any:
@@ -110,6 +123,7 @@ def _line(axes: Any, found: Any, shown: Any, dim: str, items: list[Any], texts: 
 
 
 def _areas(axes: Any, found: Any, shown: Any, dims: list[str]) -> None:
+    from matplotlib.collections import LineCollection
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -119,11 +133,28 @@ def _areas(axes: Any, found: Any, shown: Any, dims: list[str]) -> None:
     place = np.array([[kinds.index(own) for own in row] for row in cells])
     colours = ["0.8" if own == "" else _AREAS[k % len(_AREAS)] for k, own in enumerate(kinds)]
     axes.pcolormesh(x, y, place.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(kinds) - 0.5, shading="nearest", rasterized=True)
-    for index in range(len(kinds)):
-        if min(place.shape) > 1 and len(kinds) > 1:
-            axes.contour(x, y, (place == index).T.astype(float), [0.5], colors="black", linewidths=0.8)
+    axes.add_collection(LineCollection(_edges(x, y, place), colors="black", linewidths=0.8))
     axes.legend(handles=[Patch(color=own, label=kind or "no value") for own, kind in zip(colours, kinds, strict=True)], fontsize="small")
     axes.set_ylabel(_label(found, dims[1]))
+
+
+def _edges(x: Floats, y: Floats, place: Any) -> list[Any]:
+    """Returns the lines between cells that differ."""
+    across, up = _between(x), _between(y)
+    lines = []
+    for i, j in zip(*np.nonzero(place[1:] != place[:-1]), strict=True):
+        lines.append([(across[i + 1], up[j]), (across[i + 1], up[j + 1])])
+    for i, j in zip(*np.nonzero(place[:, 1:] != place[:, :-1]), strict=True):
+        lines.append([(across[i], up[j + 1]), (across[i + 1], up[j + 1])])
+    return lines
+
+
+def _between(values: Floats) -> Floats:
+    """Returns the middles between values, and the outer ends of the first and the last cell."""
+    if len(values) == 1:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    middles = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate([[2 * values[0] - middles[0]], middles, [2 * values[-1] - middles[-1]]])
 
 
 def _surface(axes: Any, found: Any, shown: Any, dims: list[str]) -> None:

@@ -165,10 +165,10 @@ class Uncertainty(Sequence[Spread]):
         return artists
 
     def __repr__(self) -> str:
-        head = f"  {'value':>13}  {'first order':>11}  {'sampled':>11}  {'95 % of samples':>27}  without  special point"
+        head = f"  {'value':>13}  {'first order':>11}  {'sampled':>11}  {'95 % of samples':>22}  without  special point"
         lines = [
             f"  {own.value:13.9g}  {_short(own.first_order):>11}  {_short(own.sigma):>11}  "
-            f"{'[{:.8g}, {:.8g}]'.format(*own.range):>27}  {sum(own.without.values()):7d}  {own.name}"
+            f"{'[{:.6g}, {:.6g}]'.format(*own.range):>22}  {sum(own.without.values()):7d}  {own.name}"
             for own in self._rows
         ]
         given = ", ".join(f"{name} {_said(own)}" for name, own in self.spreads.items())
@@ -234,7 +234,7 @@ def uncertainty(
     >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
     >>> foldline.uncertainty(branch, {"b": 0.01}, samples=50)
     uncertain: b ± 0.01
-              value  first order      sampled              95 % of samples  without  special point
+              value  first order      sampled         95 % of samples  without  special point
                   2         0.01 ...        0  equilibrium over a: fold 1
                  -2         0.01 ...        0  equilibrium over a: fold 2
     """
