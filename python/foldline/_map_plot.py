@@ -134,7 +134,9 @@ def _areas(axes: Any, found: Any, shown: Any, dims: list[str]) -> None:
     colours = ["0.8" if own == "" else _AREAS[k % len(_AREAS)] for k, own in enumerate(kinds)]
     axes.pcolormesh(x, y, place.T, cmap=ListedColormap(colours), vmin=-0.5, vmax=len(kinds) - 0.5, shading="nearest", rasterized=True)
     axes.add_collection(LineCollection(_edges(x, y, place), colors="black", linewidths=0.8))
-    axes.legend(handles=[Patch(color=own, label=kind or "no value") for own, kind in zip(colours, kinds, strict=True)], fontsize="small")
+    handles = [Patch(color=own, label=kind or "no value") for own, kind in zip(colours, kinds, strict=True)]
+    # Areas fill the axes, so the legend stands above them.
+    axes.legend(handles=handles, fontsize="small", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=min(3, len(kinds)), frameon=False)
     axes.set_ylabel(_label(found, dims[1]))
 
 

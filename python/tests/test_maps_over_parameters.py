@@ -371,7 +371,7 @@ def test_maps_are_drawn(cusp):
     plane = foldline.map(cusp, {"b": np.linspace(-1, 3, 5), "mu": np.linspace(-2, 2, 5)}, "motions", samples=16, refine=2)
     axes = foldline.draw(plane)
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["2 equilibria", "equilibrium"]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("b", "mu")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("b", "μ")
     with pytest.raises(foldline.InputError, match="some cells only"):
         foldline.draw(plane, "x_max", motion="equilibrium")
     folds = foldline.map(cusp, {"b": [1.0, 2.0, 3.0]}, STUDY)
