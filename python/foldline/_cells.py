@@ -26,6 +26,10 @@ Cell = tuple[float, ...]
 Done = tuple[Cell, str, float]
 
 
+#: Exceptions that say what a cell is like. Others, such as a lost file, may be gone when the cell is tried again.
+_ANSWERS = (Error, IndexError, ValueError, ArithmeticError)
+
+
 class Job:
     """What is computed in every cell: a model, the names of the parameters, and a question."""
 
@@ -44,7 +48,7 @@ class Job:
             remark = "; ".join(dict.fromkeys([*heard, *([answer.remark] if answer.remark else [])]))
             text = json.dumps([dict(answer.values), {name: dict(own) for name, own in answer.items.items()}, remark])
         except Exception as error:
-            text = failed(sentence(error), isinstance(error, Error))
+            text = failed(sentence(error), isinstance(error, _ANSWERS))
         finally:
             HEARD.reset(token)
         return cell, text, time.perf_counter() - start
@@ -62,6 +66,11 @@ def sentence(error: BaseException) -> str:
 def failed(reason: str, expected: bool = True) -> str:
     """Returns the answer of a cell that has no value."""
     return json.dumps({"failure": reason, "expected": expected})
+
+
+def repeatable(text: str) -> bool:
+    """True if computing the cell again would give the same answer."""
+    return not text.startswith('{"failure"') or bool(json.loads(text)["expected"])
 
 
 def computed(payload: bytes, cells: Sequence[Cell]) -> list[Done]:

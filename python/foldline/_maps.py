@@ -15,14 +15,14 @@ import numpy as np
 
 from ._arguments import check_model, wrong_kind
 from ._arrays import finite, limits, processors, tolerable, whole
-from ._cells import Cell, Done, Job
+from ._cells import Cell, Done, Job, repeatable
 from ._dataset import assembled, category_of, library, only_category
 from ._engines import Cluster, Threads, engine_of
-from ._errors import EndedShort, Error, InputError, Interrupted
+from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted
 from ._kept import Kept, digest
 from ._layout import Layout, layout_of
 from ._progress import _bar_of_cells, _watched
-from ._questions import Limits, Question, question_of
+from ._questions import Limits, Question, Settled, question_of
 from ._refining import Refined, refine
 from ._solution import Solution
 from ._studies import RESCUED, Path, _depth
@@ -132,12 +132,20 @@ def map(
     check_model(model, "foldline.map({}, over={...}, what='motions')")
     library()
     layout = layout_of(model, over)
+    if by is not None and not refine:
+        raise ArgumentError(f"by={by!r} has no effect without refine\n  help: refine=3, by={by!r}")
+    if client is not None and jobs is not None:
+        raise ArgumentError("both client and jobs are given\n  help: jobs is the number of threads without a client; a cluster has its own")
     if isinstance(start, Solution):
         start = start.state
     if start is not None and not isinstance(start, str):
         start = model.state(start).tolist()
     own = Limits(start, whole("samples", samples), whole("seed", seed, 0), tolerable(tolerance), *limits(max_steps, max_time))
     question = question_of(what, model, own, layout.names)
+    if start is not None and not isinstance(question, Settled):
+        raise ArgumentError(
+            "start has no effect here\n  help: it is for quantities of a settled motion, what=['x_max']; a function can use case.settle(start)"
+        )
     found: xarray.Dataset = mapped(
         model, layout, question, client=client, out=out, jobs=jobs, depth=whole("refine", refine, 0), by=by, progress=progress
     )  # fmt: skip
@@ -159,8 +167,6 @@ def mapped(
     """Computes a map and returns its data set."""
     from . import __version__
 
-    if depth > 12:
-        raise InputError(f"refine = {depth} halves the steps too often\n  help: at most 12")
     refined = Refined(layout, depth) if depth else None
     job = Job(model, layout.names, question)
     engine = engine_of(job, client, processors(jobs))
@@ -215,7 +221,7 @@ class _Run:
 
         def deliver(found: Done, storable: bool) -> None:
             self.answers[found[0]] = found[1]
-            if self.kept is not None and storable:
+            if self.kept is not None and storable and repeatable(found[1]):
                 self.kept.add(found)
             self._new += 1
             self._computing += found[2]

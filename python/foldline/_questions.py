@@ -262,6 +262,9 @@ def _points(study: Any, model: Model, names: Sequence[str]) -> Points:
     from ._studies import parsed
 
     tables = tables_of(study)
+    if not any(tables.get(part) for part in ("branch", "explore", "homotopy")):
+        cure = "a study with branches, or a function: lambda case: case.run(study).surveys[0].share(...)"
+        raise InputError(f"the study has no branches, whose special points a map could show\n  help: {cure}")
     check_replaceable(tables, names)
     # Mistakes in the study are found before anything is computed.
     if not isinstance(study, Mapping) and "\n" not in str(study):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 
@@ -11,6 +12,8 @@ from ._cells import Cell
 from ._errors import InputError
 from ._layout import Layout, grid
 
+#: Largest number of cells of a fine grid.
+LARGEST = 4_000_000
 #: Index of a cell on the fine grid.
 Index = tuple[int, ...]
 #: Lowest corner of a box, and its size along every dimension.
@@ -33,6 +36,9 @@ class Refined:
             if not len(steps) or not ((steps > 0).all() or (steps < 0).all()):
                 raise InputError(f"the values of {name} do not rise or fall throughout\n  help: at least two values in order")
         self.factor = 2**depth
+        size = math.prod((len(own) - 1) * self.factor + 1 for own in layout.axes)
+        if size > LARGEST:
+            raise InputError(f"the fine grid would have {size} cells\n  help: a smaller refine=; at most {LARGEST} cells")
         axes = []
         for own in layout.axes:
             inner = own[:-1, None] + np.diff(own)[:, None] * (np.arange(self.factor) / self.factor)[None, :]

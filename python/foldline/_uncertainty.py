@@ -245,8 +245,11 @@ def uncertainty(
     if not isinstance(spreads, Mapping) or not spreads:
         check_parameters("spreads", spreads)
         raise ArgumentError("no parameter is uncertain\n  help: {'zeta': 0.002} or {'zeta': (0.008, 0.012)}")
-    diagram: Any = study.diagram if is_branch(study) else study
-    if not isinstance(diagram, Diagram):
+    if is_branch(study):
+        diagram = study.diagram
+    elif isinstance(study, Diagram):
+        diagram = study
+    else:
         diagram = run(study, model, jobs=jobs)
     own = diagram.model
     given = checked_spreads(own, spreads)

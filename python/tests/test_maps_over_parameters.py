@@ -155,6 +155,12 @@ def test_a_wrong_function_ends_the_map(cusp):
         ([{"b": 1.0}], "motions", {"refine": 1}, "only a grid"),
         ({"b": [1.0, 2.0]}, fold, {"refine": 1}, "by which value"),
         ({"b": [1.0, 2.0]}, fold, {"refine": 1, "by": "value"}, "not a category"),
+        ({"b": [1.0, 2.0]}, "motions", {"refine": 22}, "fine grid would have"),
+        ({"b": [1.0]}, "motions", {"by": "motions"}, "no effect without refine"),
+        ({"b": [1.0]}, "motions", {"start": [1.0]}, "start has no effect"),
+        ({"b": [1.0]}, ["x_max"], {"start": {"y": 1.0}}, "no state `y`"),
+        ({"b": [1.0]}, "motions", {"client": 1, "jobs": 2}, "both client and jobs"),
+        ({"b": [1.0]}, {"survey": [{"name": "s"}]}, {}, "no branches"),
         ({"b": [1.0]}, "motions", {"client": "tcp://here:1"}, "client of dask"),
     ],
 )
@@ -181,6 +187,24 @@ def test_missing_packages_are_named_with_the_cure(cusp, monkeypatch):
     monkeypatch.setitem(sys.modules, "scipy.stats", None)
     with pytest.raises(ImportError, match=r'pip install "foldline\[cluster\]"'):
         foldline.latin_hypercube({"b": (0, 1)}, 3)
+
+
+def test_what_may_be_passing_is_tried_again(cusp, tmp_path):
+    broken = tmp_path / "broken"
+    broken.touch()
+
+    def moody(case):
+        if case["b"] > 1 and broken.exists():
+            raise OSError("the disk is gone")
+        return 1 / (case["b"] - 1) if case["b"] < 1 else case["b"] if case["b"] > 1 else 1 // 0
+
+    over = {"b": [0.0, 1.0, 2.0]}
+    with pytest.warns(foldline.EndedShort, match="2 of 3 cells"):
+        foldline.map(cusp, over, moody, out=tmp_path / "map")
+    broken.unlink()
+    with pytest.warns(foldline.EndedShort, match="1 of 3 cells have no values: 1 × ZeroDivisionError"):
+        found = foldline.map(cusp, over, moody, out=tmp_path / "map")
+    assert found.attrs["cells_computed"] == 1 and found["value"].values[[0, 2]].tolist() == [-1.0, 2.0]
 
 
 # Equality, folders, interruption.
