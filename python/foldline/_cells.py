@@ -46,7 +46,8 @@ class Job:
         try:
             answer = self.question.answer(Case(self.model, dict(zip(self.names, cell, strict=True))))
             remark = "; ".join(dict.fromkeys([*heard, *([answer.remark] if answer.remark else [])]))
-            text = json.dumps([dict(answer.values), {name: dict(own) for name, own in answer.items.items()}, remark])
+            items = {name: dict(own) for name, own in answer.items.items()}
+            text = json.dumps([dict(answer.values), items, remark, dict(answer.absent)])
         except Exception as error:
             text = failed(sentence(error), isinstance(error, _ANSWERS))
         finally:

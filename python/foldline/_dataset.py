@@ -54,8 +54,7 @@ def assembled(
     if question.items:
         labels = list(dict.fromkeys(label for own in items for label in own))
         for name in _names(own[label] for own in items for label in own):
-            # There are 0 motions of a kind in a cell that was computed and has none.
-            none = [0 if name == "number" and own is not None else None for own in found]
+            none = [None if own is None else own[3].get(name) for own in found]
             rows = [[own.get(label, {}).get(name, other) for label in labels] for own, other in zip(items, none, strict=True)]
             made.add_items(name, question.items, labels, rows)
     made.add("failure", failure, known=True)

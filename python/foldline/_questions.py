@@ -25,11 +25,12 @@ RESERVED = ("failure", "remark", "computed", "case", "motion", "point")
 
 
 class Answer(NamedTuple):
-    """Values of a cell; values of each of the motions or points found there; a remark."""
+    """Values of a cell; values of each of the motions or points found there; a remark; values of motions that were not found."""
 
     values: Mapping[str, Any]
     items: Mapping[str, Mapping[str, Any]] = {}
     remark: str = ""
+    absent: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ class Motions:
         said = " + ".join(counted(kinds[kind]["number"], kind) for kind in sorted(kinds))
         values = {"motions": said or "none", "unsettled": found.unsettled + found.stuck, "escaped": found.escaped}
         lost = found.unsettled + found.stuck
-        return Answer(values, kinds, f"{lost} of {found.samples} initial states did not settle" if lost else "")
+        remark = f"{lost} of {found.samples} initial states did not settle" if lost else ""
+        return Answer(values, kinds, remark, {"number": 0})
 
     def about(self, model: Model) -> dict[str, dict[str, str]]:
         return {
@@ -117,7 +119,9 @@ class Shares:
         unsettled, escaped = joined.share(-1)[0], joined.share(-2)[0]
         said = " + ".join(counted(own["number"], kind) for kind, own in items.items())
         values = {"motions": said or "none", "unsettled": unsettled, "escaped": escaped}
-        return Answer(values, items, f"{100 * unsettled:.3g} % of the initial states did not settle" if unsettled else "")
+        none, low, high = joined.share(len(kinds))
+        absent = {"share": none, "share_low": low, "share_high": high, "number": 0}
+        return Answer(values, items, f"{100 * unsettled:.3g} % of the initial states did not settle" if unsettled else "", absent)
 
     def about(self, model: Model) -> dict[str, dict[str, str]]:
         return {

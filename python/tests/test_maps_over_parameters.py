@@ -77,6 +77,16 @@ def test_shares_have_confidence_intervals(cusp):
     assert (own["share_low"] > 0.9).all() and (own["share_high"] == 1).all()
 
 
+def test_a_motion_that_no_sample_reached_has_the_share_zero_with_an_upper_bound():
+    equations = {"x": "y", "y": "(1 - x^2)*y - x + F"}
+    box = dict(range=(-3, 3))
+    circling = foldline.model(equations=equations, states={"x": box, "y": box}, parameters={"F": 0.0})
+    own = foldline.map(circling, {"F": [0.0, 1.2]}, "shares", samples=64).sel(motion="equilibrium")
+    assert own["share"].values.tolist() == [0.0, 1.0] and own["number"].values.tolist() == [0, 1]
+    # Wilson: z²/(n + z²).
+    assert own["share_high"].values[0] == pytest.approx(1.96**2 / (64 + 1.96**2), rel=1e-4)
+
+
 def test_quantities_of_a_settled_motion(cusp):
     found = foldline.map(cusp, {"mu": [0.0]}, ["x_max", "period"], start={"x": 2.0})
     assert found["x_max"].item() == pytest.approx(3**0.5, abs=1e-9) and np.isnan(found["period"].item())
@@ -401,7 +411,7 @@ def test_maps_are_drawn(cusp):
     folds = foldline.map(cusp, {"b": [1.0, 2.0, 3.0]}, STUDY)
     assert len(foldline.draw(folds, "value").lines) == 2
     with pytest.raises(foldline.InputError, match="no variable"):
-        foldline.draw(folds, "valu")
+        foldline.draw(folds, "values")
     grid = foldline.map(cusp, {"b": [1.0, 2.0, 3.0], "mu": [0.0, 1.0, 2.0]}, ["x_max"], start=[3.0])
     assert foldline.draw(grid, "x_max").collections
 
