@@ -34,6 +34,9 @@ class Job:
     """What is computed in every cell: a model, the names of the parameters, and a question."""
 
     def __init__(self, model: Model, names: Sequence[str], question: Question) -> None:
+        from . import __version__
+
+        self.version = __version__
         self.model = model
         self.names = tuple(names)
         self.question = question
@@ -80,14 +83,17 @@ def computed(payload: bytes, cells: Sequence[Cell]) -> list[Done]:
     return [job.at(cell) for cell in cells]
 
 
-def version(payload: bytes) -> str:
-    """Returns what must agree on all machines, after reading the job."""
-    from . import __version__
-
+def ready(payload: bytes) -> None:
+    """Reads a job, which the worker then has at hand."""
     _unpacked(payload)
-    return f"foldline {__version__}"
 
 
 @lru_cache(maxsize=4)
 def _unpacked(payload: bytes) -> Any:
-    return pickle.loads(payload)
+    from . import __version__
+
+    job = pickle.loads(payload)
+    if job.version != __version__:
+        message = f"a worker has foldline {__version__}, and the map was made with foldline {job.version}"
+        raise Error(f"{message}\n  help: the same version on all machines")
+    return job

@@ -12,8 +12,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from typing import Any
 
-from ._cells import Cell, Done, Job, computed, failed, sentence, version
+from ._cells import Cell, Done, Job, computed, failed, ready, sentence
 from ._errors import ArgumentError, Error
+from ._studies import _depth
 
 #: Called with each answer, and whether it may be stored.
 Deliver = Callable[[Done, bool], None]
@@ -30,6 +31,8 @@ EVEN = 4
 TRIES = 3
 #: Seconds between looks for answers, and without any before the workers are counted.
 PAUSE, ALONE = 0.002, 30.0
+#: Number of parts in which a group is tried again whose workers died.
+PARTS = 8
 #: Number of tasks before the time of a cell is known, and seconds for which that is waited for.
 FIRST, WAIT = 32, 1.0
 #: Reason why a cell has no value whose workers died several times, each time while nothing else was computed.
@@ -111,23 +114,19 @@ class Cluster:
 
     def _prepare(self) -> None:
         """Checks the workers, and measures what a task costs."""
-        from . import __version__
-
-        found: set[str] = set()
         begun = time.perf_counter()
         for _ in range(2):
             start = time.perf_counter()
-            tried = [self.client.submit(version, self.payload, pure=False) for _ in range(min(4 * self.threads, 64))]
+            tried = [self.client.submit(ready, self.payload, pure=False) for _ in range(min(4 * self.threads, 64))]
             try:
-                found = set(self.client.gather(tried))
+                self.client.gather(tried)
+            except Error as error:
+                raise ArgumentError(str(error)) from error
             except Exception as error:
                 cure = "the same environment on all machines; modules of your own with client.upload_file('module.py')"
                 raise ArgumentError(f"the workers cannot compute this map: {sentence(error)}\n  help: {cure}") from error
             self.task = (time.perf_counter() - start) / len(tried)
         self.prepared = time.perf_counter() - begun
-        if found != {f"foldline {__version__}"}:
-            message = f"the workers have {', '.join(sorted(found))}, and this machine has foldline {__version__}"
-            raise ArgumentError(f"{message}\n  help: the same version on all machines")
 
     def compute(self, cells: Sequence[Cell], deliver: Deliver) -> None:
         """Computes cells."""
@@ -169,9 +168,11 @@ class Cluster:
                     elif not isinstance(error, dask.KilledWorker):
                         message = sentence(error) if isinstance(error, BaseException) else str(error)
                         raise Error(f"a worker failed outside the cells: {message}\n  help: client.get_worker_logs() shows the logs")
+                    elif len(group) == 1:
+                        killed(group[0])
                     else:
-                        for cell in group:
-                            killed(cell)
+                        size = math.ceil(len(group) / PARTS)
+                        again += [(group[k : k + size], 0) for k in range(0, len(group), size)]
                     future.release()
         finally:
             if groups:
@@ -199,7 +200,7 @@ class Cluster:
             if now - self._heard > ALONE:
                 self._heard = now
                 if not self.client.nthreads():
-                    warnings.warn("the cluster has no workers; the map waits for new ones, and Ctrl-C ends it", stacklevel=2)
+                    warnings.warn("the cluster has no workers; the map waits for new ones, and Ctrl-C ends it", stacklevel=_depth())
             time.sleep(PAUSE)
 
     def _taken(self, queue: list[Cell]) -> list[Cell]:

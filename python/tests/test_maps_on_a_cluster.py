@@ -108,16 +108,23 @@ def test_a_cell_that_ends_its_workers_is_told_from_its_neighbours(client, cusp):
             os._exit(1)
         return case["b"]
 
-    with pytest.warns(foldline.EndedShort, match="every worker that computed this cell died"):
-        found = foldline.map(cusp, {"b": [1.0, 2.0, 3.0, 4.0]}, deadly, client=client)
-    assert [bool(own) for own in found["failure"].values] == [False, False, True, False]
-    assert found["value"].values[[0, 1, 3]].tolist() == [1.0, 2.0, 4.0]
+    over = {"b": np.arange(100.0)}
+    with pytest.warns(foldline.EndedShort, match="1 of 100 cells have no values: 1 × every worker that computed this cell died"):
+        found = foldline.map(cusp, over, deadly, client=client)
+    assert np.flatnonzero(found["failure"].values != "").tolist() == [3]
+    assert np.array_equal(np.delete(found["value"].values, 3), np.delete(np.arange(100.0), 3))
 
 
 def test_what_workers_cannot_read_is_refused(client, cusp):
     rest = cusp.settle([-2.0])
     with pytest.raises(foldline.InputError, match="cannot be sent to workers: TypeError: a solution that lies on no branch"):
         foldline.map(cusp, {"b": [1.0]}, lambda case: case.follow("mu", (-2.5, 2.5), rest)["x"][0], client=client)
+
+
+def test_workers_with_another_version_are_refused(client, cusp, monkeypatch):
+    monkeypatch.setattr(foldline, "__version__", "99.0")
+    with pytest.raises(foldline.InputError, match=r"a worker has foldline .*, and the map was made with foldline 99\.0"):
+        foldline.map(cusp, {"b": [1.0]}, STUDY, client=client)
 
 
 def test_a_closed_client_is_refused(client, cusp):
