@@ -61,7 +61,7 @@ class Job:
 def sentence(error: BaseException) -> str:
     """Returns the message of an exception on one line, with its kind unless it is one of foldline's."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    told = " ".join(lines)
+    told = "; ".join(lines)
     if isinstance(error, Error):
         return told or type(error).__name__
     return f"{type(error).__name__}: {told}" if told else type(error).__name__

@@ -129,7 +129,7 @@ def map(
     >>> found["value"].values.tolist()
     [1, 2]
     """
-    check_model(model, "foldline.map({}, over={...}, what='motions')")
+    check_model(model, "foldline.map({}, over={{...}}, what='motions')")
     library()
     layout = layout_of(model, over)
     if by is not None and not refine:

@@ -322,7 +322,7 @@ def _checked(name: str, value: Any) -> Any:
         array = np.empty(0, dtype=object)
     if array.dtype.kind in "biuf" and array.ndim <= 1:
         return array.astype(float).tolist()
-    raise ArgumentError(f"the function returned {described(value)} for {name}\n  help: a number, a text, or a list of numbers")
+    raise TypeError(f"the function returned {described(value)} for {name}, not a number, a text, or a list of numbers")
 
 
 def source_of(function: Any) -> list[str]:

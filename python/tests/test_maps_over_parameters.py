@@ -142,6 +142,10 @@ def test_a_wrong_function_ends_the_map(cusp):
     with pytest.raises(foldline.Error, match="failed in the same way: AttributeError"):
         foldline.map(cusp, {"b": np.linspace(0, 1, 100)}, wrong, jobs=1)
     assert len(calls) == 10
+    with pytest.raises(
+        foldline.Error, match="the first 2 cells failed in the same way: TypeError: the function returned a solution for value"
+    ):
+        foldline.map(cusp, {"mu": [-2.0, -1.9]}, lambda case: case.settle([-2.0]))
 
 
 @pytest.mark.parametrize(
@@ -155,6 +159,7 @@ def test_a_wrong_function_ends_the_map(cusp):
         ({"b": [1.0, np.nan]}, "motions", {}, "not finite"),
         ([{"b": 1.0}, {"mu": 1.0}], "motions", {}, "different parameters: b, mu"),
         (3, "motions", {}, "a dictionary or a list"),
+        ({"b": [1.0]}, "x_mx", {}, "did you mean `x_max`"),
         ({"b": [1.0]}, "motion", {}, "cannot show 'motion'"),
         ({"b": [1.0]}, 3, {}, "a name, a study or a function"),
         ({"mu": [1.0]}, STUDY, {}, "`mu` varies in the branch"),
@@ -178,6 +183,11 @@ def test_mistakes_name_their_remedy(cusp, over, what, options, said):
     with pytest.raises(foldline.InputError, match=said) as caught:
         foldline.map(cusp, over, what, **options)
     assert "help:" in str(caught.value)
+
+
+def test_a_file_is_no_model():
+    with pytest.raises(foldline.ArgumentError, match="a model is needed"):
+        foldline.map("model.toml", {"b": [1.0]}, "motions")
 
 
 def test_a_study_with_several_values_of_a_parameter_of_the_map_is_refused(cusp):
