@@ -62,7 +62,10 @@ def draw(found: Any, name: str | None = None, ax: Any = None, **where: str) -> A
     shown = found[own].sel(where) if where else found[own]
     items = [dim for dim in shown.dims if dim in ("motion", "point")]
     dims = [str(dim) for dim in shown.dims if dim not in items]
-    if "case" in dims or not 1 <= len(dims) <= 2 or (items and len(dims) == 2):
+    if "case" in dims:
+        cure = f"found.plot.scatter(x={_parameter(found)!r}, y={own!r}), of xarray"
+        raise InputError(f"a list of cases has no order in which it could be drawn\n  help: {cure}")
+    if not 1 <= len(dims) <= 2 or (items and len(dims) == 2):
         cure = f"choose one: {items[0]}={str(found[items[0]].values[0])!r}" if items and len(dims) == 2 else "found.sel(...) reduces a grid"
         raise InputError(f"`{own}` extends over {', '.join(map(str, shown.dims))} and cannot be drawn\n  help: {cure}")
     axes = axes_or_new(ax)
@@ -75,6 +78,11 @@ def draw(found: Any, name: str | None = None, ax: Any = None, **where: str) -> A
         _surface(axes, found, shown, dims)
     axes.set_xlabel(_label(found, dims[0]))
     return axes
+
+
+def _parameter(found: Any) -> str:
+    """Returns the first parameter of a list of cases."""
+    return next((str(name) for name, own in found.coords.items() if own.dims == ("case",) and name != "case"), "case")
 
 
 def _label(found: Any, name: str) -> str:

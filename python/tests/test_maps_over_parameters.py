@@ -422,6 +422,10 @@ def test_maps_are_drawn(cusp):
     assert len(foldline.draw(folds, "value").lines) == 2
     with pytest.raises(foldline.InputError, match="no variable"):
         foldline.draw(folds, "values")
+    cases = foldline.map(cusp, [{"b": 1.0}, {"b": 2.0}], fold)
+    with pytest.raises(foldline.InputError, match=r"found\.plot\.scatter\(x='b', y='value'\)"):
+        foldline.draw(cases)
+    cases.plot.scatter(x="b", y="value")
     grid = foldline.map(cusp, {"b": [1.0, 2.0, 3.0], "mu": [0.0, 1.0, 2.0]}, ["x_max"], start=[3.0])
     assert foldline.draw(grid, "x_max").collections
 
