@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import inspect
 import os
-import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,6 +11,7 @@ import numpy as np
 
 from ._arguments import described, suggestion, wrong_kind
 from ._errors import ArgumentError, InputError
+from ._fingerprint import fingerprint
 from ._study_at import check_replaceable, study_at, tables_of
 
 if TYPE_CHECKING:
@@ -212,8 +211,8 @@ class Calls:
 
     def identity(self) -> Any:
         if isinstance(self.functions, Mapping):
-            return ["functions", {name: source_of(own) for name, own in self.functions.items()}]
-        return ["function", source_of(self.functions)]
+            return ["functions", {name: fingerprint(own) for name, own in self.functions.items()}]
+        return ["function", fingerprint(self.functions)]
 
     def answer(self, case: Case) -> Answer:
         if isinstance(self.functions, Mapping):
@@ -323,28 +322,3 @@ def _checked(name: str, value: Any) -> Any:
     if array.dtype.kind in "biuf" and array.ndim <= 1:
         return array.astype(float).tolist()
     raise TypeError(f"the function returned {described(value)} for {name}, not a number, a text, or a list of numbers")
-
-
-def source_of(function: Any) -> list[str]:
-    """Returns what tells a function from others: its source, and the values that it closes over."""
-    name = getattr(function, "__qualname__", type(function).__qualname__)
-    try:
-        text = textwrap.dedent(inspect.getsource(function))
-    except (OSError, TypeError):
-        code = getattr(function, "__code__", None)
-        text = code.co_code.hex() + repr(code.co_consts) if code is not None else _plain(function)
-    cells = getattr(function, "__closure__", None) or ()
-    kept = [*(_plain(cell.cell_contents) for cell in cells), *(_plain(own) for own in getattr(function, "__defaults__", None) or ())]
-    return [name, text, *kept]
-
-
-def _plain(value: Any) -> str:
-    """Returns a text of a value that is the same in another process."""
-    from ._model import Model
-
-    if isinstance(value, Model):
-        return value.text
-    if inspect.isroutine(value):
-        return str(getattr(value, "__qualname__", value))
-    shown = repr(value)
-    return type(value).__qualname__ if " at 0x" in shown else shown

@@ -121,6 +121,14 @@ def test_what_workers_cannot_read_is_refused(client, cusp):
         foldline.map(cusp, {"b": [1.0]}, lambda case: case.follow("mu", (-2.5, 2.5), rest)["x"][0], client=client)
 
 
+def test_uncertainty_and_branches_travel(client, cusp):
+    branch = foldline.follow(cusp.settle([-2.0]), "mu", (-2.5, 2.5))
+    here, there = (foldline.uncertainty(branch, {"b": 0.01}, samples=10, client=own) for own in (None, client))
+    assert list(here) == list(there)
+    found = foldline.map(cusp, {"b": [3.0]}, lambda case: branch.special["fold"][0].value, client=client)
+    assert found["value"].item() == branch.special["fold"][0].value
+
+
 def test_workers_with_another_version_are_refused(client, cusp, monkeypatch):
     monkeypatch.setattr(foldline, "__version__", "99.0")
     with pytest.raises(foldline.InputError, match=r"a worker has foldline .*, and the map was made with foldline 99\.0"):

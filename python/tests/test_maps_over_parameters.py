@@ -1,5 +1,6 @@
 """Maps over parameters on threads: answers, failures, folders, refinement."""
 
+import functools
 import json
 import os
 import pickle
@@ -17,6 +18,7 @@ from test_book import examples
 
 import foldline
 from foldline._engines import COST, group_size
+from foldline._fingerprint import fingerprint
 
 STUDY = {
     "seed": [{"name": "low", "state": {"x": -2}}],
@@ -306,6 +308,43 @@ def test_a_folder_of_another_map_is_refused(cusp, tmp_path, monkeypatch):
     monkeypatch.setattr(foldline, "__version__", "99.0")
     with pytest.raises(foldline.RunFileError, match=r"version of foldline differs .*, 99\.0 here"):
         foldline.map(cusp, {"b": [1.0]}, STUDY, out=folder)
+
+
+LIMIT = 1.0
+
+
+def limited(case):
+    return case["b"] > LIMIT
+
+
+def test_a_function_is_known_by_its_text_and_by_what_it_refers_to(cusp, tmp_path, monkeypatch):
+    offset, table = 1.0, np.arange(2000.0)
+    own = lambda case: inner(case) + offset + table[1000]  # noqa: E731
+
+    def first(case):
+        return case["b"]
+
+    def second(case):
+        return -case["b"]
+
+    inner = first
+    before = fingerprint(own)
+    assert before == fingerprint(own)
+    offset = 2.0
+    assert before != fingerprint(own)
+    offset = 1.0
+    table[1000] = 7.0
+    assert before != fingerprint(own)
+    table[1000] = 1000.0
+    assert before == fingerprint(own)
+
+    inner = second
+    assert before != fingerprint(own)
+    assert fingerprint(functools.partial(limited, 1)) != fingerprint(functools.partial(limited, 2))
+    foldline.map(cusp, {"b": [2.0]}, limited, out=tmp_path / "map")
+    monkeypatch.setitem(globals(), "LIMIT", 3.0)
+    with pytest.raises(foldline.RunFileError, match="what is computed differs"):
+        foldline.map(cusp, {"b": [2.0]}, limited, out=tmp_path / "map")
 
 
 def test_a_map_is_saved_as_netcdf(cusp, tmp_path):
