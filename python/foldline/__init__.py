@@ -14,10 +14,13 @@ from importlib.metadata import version as _version
 
 from ._basins import Basins, basins
 from ._branch import Branch, SpecialPoint, SpecialPoints
+from ._case import Case
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
 from ._ensemble import Ensemble, ensemble
 from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._map_plot import draw
+from ._maps import latin_hypercube, map
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._rotor import rotor
@@ -27,6 +30,7 @@ from ._solution import Attractor, Attractors, Solution
 from ._strobe import Strobe, strobe
 from ._sweeps import survey, sweep
 from ._symbols import where
+from ._uncertainty import Spread, Uncertainty, uncertainty
 
 try:
     __version__ = _version("foldline")
@@ -40,6 +44,7 @@ __all__ = [
     "Band",
     "Basins",
     "Branch",
+    "Case",
     "Derivative",
     "DeviceError",
     "Diagram",
@@ -57,17 +62,22 @@ __all__ = [
     "Solution",
     "SpecialPoint",
     "SpecialPoints",
+    "Spread",
     "Strobe",
     "Survey",
     "Sweep",
     "TraceError",
     "Trajectory",
+    "Uncertainty",
     "basins",
+    "draw",
     "ensemble",
     "explore",
     "follow",
     "hold",
     "homotopy",
+    "latin_hypercube",
+    "map",
     "model",
     "open",
     "rescued",
@@ -76,9 +86,10 @@ __all__ = [
     "strobe",
     "survey",
     "sweep",
+    "uncertainty",
     "where",
 ]
 
 # The module from which they are imported, which tracebacks show.
-for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
+for _class in [globals()[own] for own in __all__ if isinstance(globals()[own], type)]:
     _class.__module__ = __name__

@@ -140,10 +140,21 @@ class SpecialPoint(Solution):
         given = spreads(diagram.model, parameters)
         return bands(*diagram._native.uncertainty(self.branch._index, self._index, given, samples))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _special_of, (self.branch, self._index)
+
     def __repr__(self) -> str:
         form = f", {self.normal_form}" if self.normal_form else ""
         error = self.error * (self.branch.scale + abs(self.value))
         return f"<{self.kind} of {self.branch.name} at {self.branch.free} = {self.value:.10g} ± {error:.1e}{form}>"
+
+
+def _special_of(branch: Branch, index: int) -> SpecialPoint:
+    return branch.special[index]
+
+
+def _branch_of(diagram: Diagram, index: int) -> Branch:
+    return diagram.branches[index]
 
 
 class SpecialPoints(Sequence[SpecialPoint]):
@@ -158,8 +169,9 @@ class SpecialPoints(Sequence[SpecialPoint]):
     (1, 1, 0)
     """
 
-    def __init__(self, found: Sequence[SpecialPoint]) -> None:
+    def __init__(self, found: Sequence[SpecialPoint], kind: str = "") -> None:
         self._found = list(found)
+        self._kind = kind
 
     @overload
     def __getitem__(self, index: int) -> SpecialPoint: ...
@@ -168,7 +180,11 @@ class SpecialPoints(Sequence[SpecialPoint]):
     def __getitem__(self, index: int | slice | str) -> SpecialPoint | SpecialPoints:
         if isinstance(index, str):
             kind = index.replace("_", "-")
-            return SpecialPoints([own for own in self._found if own.kind == kind])
+            return SpecialPoints([own for own in self._found if own.kind == kind], kind)
+        if isinstance(index, int) and not -len(self._found) <= index < len(self._found):
+            raise IndexError(
+                f"there are {len(self._found)} special points{f' of the kind {self._kind}' * bool(self._kind)}, and not one of index {index}"
+            )
         found = self._found[index]
         return SpecialPoints(found) if isinstance(found, list) else found
 
@@ -257,6 +273,9 @@ class Branch(Sequence[Solution]):
         self._count: int = parts["points"]
         self._ends: list[tuple[str, str, bool] | None] = parts["ends"]
         self.ends: tuple[str, str] = tuple("unfinished" if end is None else end[1] for end in self._ends)  # type: ignore[assignment]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _branch_of, (self.diagram, self._index)
 
     @property
     def complete(self) -> bool:
@@ -361,7 +380,9 @@ class Branch(Sequence[Solution]):
         place = index + self._count if index < 0 else index
         if not 0 <= place < self._count:
             raise IndexError(f"the branch {self.name} has {self._count} points")
-        return Solution(self.diagram._native.solution(self._index, False, place), self.diagram.model)
+        found = Solution(self.diagram._native.solution(self._index, False, place), self.diagram.model)
+        found._home = (self, place)
+        return found
 
     def __len__(self) -> int:
         return self._count

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -225,6 +226,13 @@ class Diagram:
         """
         self._native.save(os.fspath(folder))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles the run file. The folder of the run, if there is one, is not known to the copy."""
+        with tempfile.TemporaryDirectory() as folder:
+            self._native.save(folder)
+            with open(os.path.join(folder, _RUN), "rb") as file:
+                return _unpacked, (type(self), file.read())
+
     def __repr__(self) -> str:
         from ._html import diagram_text
 
@@ -234,6 +242,18 @@ class Diagram:
         from ._html import diagram
 
         return diagram(self)
+
+
+#: Name of the run file in its folder.
+_RUN = "run.sqlite"
+
+
+def _unpacked(kind: type[Diagram], run: bytes) -> Diagram:
+    """Returns a diagram from its run file."""
+    with tempfile.TemporaryDirectory() as folder:
+        with open(os.path.join(folder, _RUN), "wb") as file:
+            file.write(run)
+        return kind(_native.Diagram.load(folder))
 
 
 class Homotopy(Diagram):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import xarray
+
     from ._branch import Branch
     from ._diagram import Diagram
     from ._ensemble import Ensemble
@@ -64,7 +66,7 @@ class DeviceError(Error):
 
 
 class EndedShort(UserWarning):
-    """Warning that a branch ended before it reached the end of its range."""
+    """Warning that a branch ended before it reached the end of its range, or that cells of a map have no values."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -72,10 +74,10 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes
     ----------
-    partial : Diagram, Branch, Trajectory or Ensemble
+    partial : Diagram, Branch, Trajectory, Ensemble or Dataset
         The results so far. Unfinished branches end as "stopped on request". `foldline.rescued()` returns them too.
     """
 
-    def __init__(self, partial: Diagram | Branch | Trajectory | Ensemble) -> None:
+    def __init__(self, partial: Diagram | Branch | Trajectory | Ensemble | xarray.Dataset) -> None:
         super().__init__("stopped on request; the results so far are in the attribute `partial` and in foldline.rescued()")
         self.partial = partial

@@ -39,12 +39,20 @@ def shown(progress: Progress) -> Iterator[Callable[[int, int, str], None] | None
 
 
 def _bar(delay: float) -> Any:
-    form = "{n_fmt} points{postfix} [{elapsed}]"
+    return _tqdm()(bar_format="{n_fmt} points{postfix} [{elapsed}]", leave=False, delay=delay)
+
+
+def _bar_of_cells(delay: float) -> Any:
+    form = "{n_fmt} of {total_fmt} cells {bar} [{elapsed}, {remaining} left]"
+    return _tqdm()(total=0, bar_format=form, leave=False, delay=delay)
+
+
+def _tqdm() -> Any:
     if _notebook() and importlib.util.find_spec("ipywidgets") is not None:
         from tqdm.notebook import tqdm
     else:
         from tqdm import tqdm
-    return tqdm(bar_format=form, leave=False, delay=delay)
+    return tqdm
 
 
 def _show(bar: Any, points: int, special: int, place: str) -> None:

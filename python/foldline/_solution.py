@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
+    from ._branch import Branch
     from ._model import Model
 
 
@@ -40,9 +42,19 @@ class Solution:
     [-0.1, -0.1]
     """
 
+    #: Branch on which it lies, and its number there, if it was taken from one.
+    _home: tuple[Branch, int] | None = None
+
     def __init__(self, native: _native.Solution, model: Model) -> None:
         self._native = native
         self.model = model
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickles the branch on which it lies. A solution that lies on none cannot be pickled."""
+        if self._home is None:
+            cure = "a point of a branch, branch[0]; or send model and state, and let it settle again: model.settle(solution.state)"
+            raise TypeError(f"a solution that lies on no branch cannot be pickled\n  help: {cure}")
+        return operator.getitem, self._home
 
     @property
     def family(self) -> str:

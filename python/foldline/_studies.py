@@ -6,6 +6,7 @@ import os
 import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from contextvars import ContextVar
 from typing import Any
 
 from . import _native, _write
@@ -25,6 +26,8 @@ Range = Sequence[float | str]
 START = "the given solution"
 #: Partial result of the last computation that was interrupted.
 RESCUED: list[Any] = []
+#: Receives what fell short in the computations of a case, in place of warnings.
+HEARD: ContextVar[list[str] | None] = ContextVar("HEARD", default=None)
 
 
 def _depth() -> int:
@@ -122,7 +125,12 @@ def carried_out(
         raise Interrupted(partial) from None
     # The branch switched from has already given its warning.
     known_short = f"{earlier.name}:" if earlier is not None else "\0"
+    heard = HEARD.get()
     for line in short:
-        if not line.startswith(known_short):
+        if line.startswith(known_short):
+            continue
+        if heard is None:
             warnings.warn(line, EndedShort, stacklevel=_depth())
+        else:
+            heard.append(line)
     return diagram
