@@ -23,7 +23,7 @@ pub(super) const KEYS: [&str; 12] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 7] = [
+const HELD: [Kind; 9] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -31,6 +31,8 @@ const HELD: [Kind; 7] = [
     Kind::Torus,
     Kind::Grazing,
     Kind::BoundaryEquilibrium,
+    Kind::Homoclinic,
+    Kind::Heteroclinic,
 ];
 
 /// Branch on which the special point lies.
