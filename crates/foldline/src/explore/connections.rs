@@ -396,7 +396,7 @@ fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usiz
             gain: Vec::new(),
         },
     };
-    CycleProblem::like(setting, &cycle)
+    CycleProblem::like(setting, &cycle).without_truncation()
 }
 
 /// Solves for the orbit at fixed values of all parameters but the first, and lengthens it until its truncation does not
