@@ -61,6 +61,7 @@ mod resonances;
 mod responses;
 mod schedule;
 pub mod seeds;
+mod shooting;
 mod sizes;
 pub mod switch;
 mod symmetry;
