@@ -165,11 +165,20 @@ fn branches_without_a_homoclinic_orbit_are_refused_with_the_reason() {
     let (folder, _) = desk("lorenz", &study(WING, ["rho", "[18, 30]"], ["sigma", "[9, 12]"], "10"));
     let (_, said) = run(folder.path(), 3);
     assert!(said.contains("has a period that grows without bound") && said.contains("what to do"), "{said}");
-    // Equilibria approach none.
-    let (folder, _) = desk("lorenz", &lorenz().replace("of = \"rest/hopf-1\"", "of = \"rest\""));
-    let output = foldline(folder.path(), &["run", "s.toml", "--out", "run"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(text(&output).contains("limit of cycles"), "{}", text(&output));
+    // The upper equilibria of the Lorenz equations have no homoclinic orbit here: they are stable, or have two unstable eigenvalues.
+    let (folder, _) = desk("lorenz", &lorenz().replace("of = \"rest/hopf-1\"", "of = \"rest\"").replace("[5, 30]", "[25, 30]"));
+    let (_, said) = run(folder.path(), 3);
+    assert!(said.contains("no value of the parameter on the branch") || said.contains("does not come close"), "{said}");
+    // `to` belongs to heteroclinic orbits of equilibria.
+    for (from, to, words) in [
+        ("hold = \"homoclinic\"", "hold = \"homoclinic\"\nto = { x = 0, y = 0, z = 0 }", "second equilibrium"),
+        ("hold = \"homoclinic\"", "hold = \"heteroclinic\"\nto = { x = 0, y = 0, z = 0 }", "that the cycles approach"),
+    ] {
+        let (folder, _) = desk("lorenz", &lorenz().replace(from, to));
+        let output = foldline(folder.path(), &["run", "s.toml", "--out", "run"]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(words), "{}", text(&output));
+    }
 }
 
 /// A particle in a well between two saddles, (±1, 0), with a damping that changes sign with its deflection. For eps -> 0
@@ -199,4 +208,72 @@ fn a_heteroclinic_orbit_between_two_saddles_has_the_place_of_its_limit() {
     assert_eq!(start.spectrum.iter().filter(|z| z.re > 0.0).count(), 1);
     let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+/// A branch of equilibria in `free` from a state, and the curve of orbits from it, with marks.
+fn from_rest(state: &str, [free, range]: [&str; 2], [second, second_range]: [&str; 2], marks: &str, more: &str) -> String {
+    format!(
+        "model = \"m.toml\"\ntolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = {state}\n[[branch]]\nname = \"rest\"\n\
+         from = \"s\"\nfree = \"{free}\"\nrange = {range}\n[[curve]]\nname = \"orbits\"\nof = \"rest\"\n\
+         free = \"{second}\"\nrange = {second_range}\nmark = {{ {second} = [{marks}] }}\n{more}\n"
+    )
+}
+
+/// The values of a parameter at the marks, with their stated errors.
+fn marked(diagram: &Diagram, parameter: usize) -> Vec<[f64; 2]> {
+    let curve = diagram.branch("orbits").unwrap();
+    let marks = curve.special.iter().filter(|s| s.kind == Kind::Mark);
+    let mut all: Vec<[f64; 2]> = marks
+        .map(|s| {
+            let value = s.point.parameters[parameter];
+            [value, (s.error + s.point.trust.discretisation) * (1.0 + value.abs())]
+        })
+        .collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    all
+}
+
+fn desk_of(model: &str, study: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), model).unwrap();
+    std::fs::write(folder.path().join("s.toml"), study).unwrap();
+    folder
+}
+
+/// u_t = u_xx + u (1 - u) (u - a) has a front between 0 and 1 that moves at the speed (1 - 2 a)/√2.
+#[test]
+fn the_speed_of_the_bistable_front_is_that_of_the_closed_form() {
+    let model = "name = \"front\"\n[parameters]\nc = 0.3\na = 0.25\n[states]\nu = \"v\"\nv = \"c*v - u*(1-u)*(u-a)\"\n";
+    let more = "hold = \"heteroclinic\"\nto = { u = 1, v = 0 }";
+    let study = from_rest("{ u = 0, v = 0 }", ["c", "[0.05, 0.8]"], ["a", "[0.05, 0.45]"], "0.1, 0.25, 0.4", more);
+    let folder = desk_of(model, &study);
+    let (diagram, _) = run(folder.path(), 0);
+    let found = marked(&diagram, 0);
+    assert_eq!(found.len(), 3, "{found:?}");
+    for ([value, stated], a) in found.iter().zip([0.4, 0.25, 0.1]) {
+        let off = (value - (1.0 - 2.0 * a) / 2f64.sqrt()).abs();
+        assert!(off < *stated && off < 1e-9, "a = {a}: off by {off:e}, stated {stated:e}");
+    }
+    let curve = diagram.branch("orbits").unwrap();
+    complete(curve);
+    // A front is u = 1 / (1 + exp(-z/√2)), whose slope has the maximum √2/8.
+    let top = |p: &foldline::diagram::Point| p.ranges[1][1] - 2f64.sqrt() / 8.0;
+    assert!(curve.points.iter().all(|p| top(p).abs() < 1e-8), "{:e}", top(&curve.points[0]));
+    let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+/// Bogdanov–Takens normal form: numbers of a separate program, as in `reference/connecting.csv`.
+#[test]
+fn the_loop_of_the_bogdanov_takens_normal_form_starts_from_its_saddle() {
+    let model = "name = \"bt\"\n[parameters]\nb1 = -0.01\nb2 = 0.05\n[states]\nx = \"y\"\ny = \"b1 + b2*y + x^2 + x*y\"\n";
+    let more = "hold = \"homoclinic\"";
+    let study = from_rest("{ x = 0.1, y = 0 }", ["b2", "[0.01, 0.3]"], ["b1", "[-0.05, -0.005]"], "-0.04, -0.01", more);
+    let (diagram, _) = run(desk_of(model, &study).path(), 0);
+    let found = marked(&diagram, 1);
+    assert_eq!(found.len(), 2, "{found:?}");
+    // Tolerance of the reference: 2e-8.
+    for ([value, stated], known) in found.iter().zip([0.071727763, 0.144051019]) {
+        assert!((value - known).abs() < stated + 2e-8, "{value} is not {known}");
+    }
 }

@@ -28,6 +28,16 @@ fn main() {
                 );
             }
             if b.is_connecting() {
+                if std::env::var("FLIPS").is_ok() {
+                    use foldline::contract::VectorField;
+                    let system = System::of_plan(&study.model, &study.plan);
+                    let f = foldline::problem::connecting::ConnectingField::of_stored(system.field, &system.scales, 1, &b.points[0].parameters).unwrap();
+                    for p in &b.points {
+                        let foldline::diagram::Solution::Cycle(c) = &p.solution else { continue };
+                        let v = f.flips(c, &p.parameters).map(|t| t.map(|t| t.value));
+                        println!("    flips {} {:?}", p.position, v);
+                    }
+                }
                 for p in &b.points {
                     let k = study.model.parameters.len();
                     println!("    {} {:.12?} T {:.3} disc {:.1e} eig {:.4?}", p.position, &p.parameters[..k], p.parameters[k], p.trust.discretisation, p.spectrum);

@@ -36,7 +36,7 @@ pub struct Batch<'a> {
 /// A test function whose sign depends on those of eigenvectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turning {
-    /// Value, at most 1 in size.
+    /// Value.
     pub value: f64,
     /// Vector with the same dependence: two values have comparable signs if the product of their vectors is positive.
     pub refer: Vec<f64>,

@@ -11,7 +11,7 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use super::seeds::bare;
 use super::shooting::Search;
-use crate::continuation::Settings;
+use crate::continuation::{Failure, Settings};
 use crate::continuation::corrector::parameter_row;
 use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution};
@@ -29,10 +29,16 @@ const MARGIN: f64 = 0.02;
 /// Largest estimated error of the truncation, in tolerances, of an orbit whose ends are so close to the equilibria that rounding
 /// would matter next.
 const ENOUGH: f64 = 0.5;
-/// Number of times that an orbit is lengthened. The error is at least quartered each time.
-const LENGTHENINGS: usize = 14;
-/// Smallest distance from the equilibria, in units of the sizes of the states, at which rounding does not matter yet.
-const LEAST: f64 = 1e-6;
+/// Number of times that an orbit is lengthened: a bound on the work.
+const LENGTHENINGS: usize = 40;
+/// Smallest factor by which the distances from the equilibria are reduced at once …
+const SHORTEST: f64 = 0.05;
+/// … and the one at which a further failure counts.
+const LONGEST: f64 = 0.6;
+/// Relative correction at which Newton's method has all but converged.
+const CLOSE: f64 = 1e-4;
+/// Smallest distance from the equilibria, relative to the largest on the orbit, at which rounding does not matter yet.
+const LEAST: f64 = 1e-7;
 
 /// Follows a curve of connecting orbits, or the part of it that is missing; `parent` is the branch at whose end it
 /// starts. Returns the curve, and false if the observer wants to stop.
@@ -136,7 +142,19 @@ impl<'s> Start<'s> {
         }
     }
 
-    /// Sizes ε of the point.
+    /// Largest distances of the orbit from the equilibria.
+    fn extents(&self) -> [f64; 2] {
+        let (n, parameters) = (self.field.dim(), &self.point.parameters);
+        let profile = self.cycle().map_or(&[][..], |cycle| &cycle.profile);
+        let far = |end: usize| {
+            let split = self.field.split(end, parameters)?;
+            let sizes = profile.chunks_exact(n).map(|x| split.size(&self.field.deviations([x, x], parameters)[end]));
+            Some(sizes.fold(0.0, f64::max))
+        };
+        [0, 1].map(|end| far(end).unwrap_or(f64::NAN))
+    }
+
+    /// The orbit.
     fn cycle(&self) -> Option<&Cycle> {
         match &self.point.solution {
             Solution::Cycle(cycle) => Some(cycle),
@@ -420,7 +438,7 @@ impl Departure<'_> {
             let half = if end == 0 { 0..SAMPLES / 2 } else { SAMPLES / 2..SAMPLES + 1 };
             let near = lengths(half).fold(f64::INFINITY, f64::min);
             let far = lengths(0..SAMPLES + 1).fold(0.0, f64::max);
-            let size = (SHARE * far).max(3.0 * near);
+            let size = (SHARE * far).max(2.0 * near);
             (size < 0.5 * far).then_some(size)
         };
         let sizes = [size(0)?, size(1)?];
@@ -433,7 +451,7 @@ impl Departure<'_> {
 /// Factor on the distances from the equilibria that brings the error of the truncation, which is of second order, to half of
 /// `goal`.
 fn share_for(goal: f64, error: f64) -> f64 {
-    (0.5 * goal / error).sqrt().clamp(0.05, 0.5)
+    (0.5 * goal / error).sqrt().clamp(SHORTEST, 0.5)
 }
 
 /// The point of a curve with its orbit lengthened, if the error of the truncation is what limits the curve there.
@@ -451,9 +469,16 @@ pub(super) fn relengthened(growth: &Growth, system: &System, line: &Line, at: &P
         return None;
     }
     drop(problem);
-    let (longer, parameters) = system.field.lengthened(orbit, &at.parameters, share_for(MARGIN * tolerance, error))?;
-    let start = bare(&parameters, Solution::Cycle(longer.clone()));
-    let found = growth::polished(&mut of(&start, &longer), growth.settings, &start).ok()?;
+    let share = share_for(MARGIN * tolerance, error);
+    let found = [share, share.sqrt(), share.powf(0.25)].into_iter().find_map(|share| {
+        let (longer, parameters) = system.field.lengthened(orbit, &at.parameters, share)?;
+        let mut start = bare(&parameters, Solution::Cycle(longer.clone()));
+        let mut problem = of(&start, &longer);
+        if let Some(u) = damped(&mut problem, &start, CLOSE) {
+            start = problem.point(&u, &[], Examination::default());
+        }
+        growth::polished(&mut problem, growth.settings, &start).ok()
+    })?;
     let mut point = Point { position: at.position, step: at.step, ..found.point };
     // The direction of the curve is that of its scalars.
     let scalars = system.field.determined().len() + 2;
@@ -465,16 +490,16 @@ pub(super) fn relengthened(growth: &Growth, system: &System, line: &Line, at: &P
 }
 
 /// The problem of the orbit in the branch's parameter, with the second one last, which stays.
-fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usize, degree: usize) -> CycleProblem<'s> {
+fn problem_of<'s>(point: &Point, system: &'s System, first: usize, free: usize) -> CycleProblem<'s> {
     let line = Line { held: Some((Kind::Homoclinic, first)), ..Line::new(free) };
-    let setting = line.setting(system, &start.point.parameters);
-    let cycle = match &start.point.solution {
+    let setting = line.setting(system, &point.parameters);
+    let cycle = match &point.solution {
         Solution::Cycle(cycle) => cycle.clone(),
         Solution::Equilibrium(_) | Solution::Torus(_) => Cycle {
             period: 1.0,
             forcing_periods: 1,
             mesh: vec![0.0, 1.0].into(),
-            degree,
+            degree: 4,
             profile: Vec::new(),
             gain: Vec::new(),
         },
@@ -492,36 +517,40 @@ fn settled<'s>(
     mut start: Start<'s>,
 ) -> Result<Start<'s>, String> {
     let tolerance = SHARPER * plan.tolerance;
-    let mut coarse = true;
-    for _ in 0..LENGTHENINGS {
+    let system = start.system(base);
+    let settings = growth::settings(&system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    drop(system);
+    let solved = |start: &Start, point: &Point| -> Result<(Point, f64), Failure> {
         let system = start.system(base);
-        let settings = growth::settings(&system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
-        let mut problem = problem_of(&start, &system, first, curve.free, plan.degree);
-        let mut point = start.point.clone();
-        if let Some(u) = damped(&mut problem, &point) {
+        let mut problem = problem_of(point, &system, first, curve.free);
+        let mut point = point.clone();
+        // Every step lets the conditions refer to its result.
+        if let Some(u) = damped(&mut problem, &point, CLOSE) {
             point = problem.point(&u, &[], Examination::default());
         }
-        let found = growth::polished(&mut problem, &settings, &point).map_err(|why| {
-            let how = if coarse { "cut at the equilibrium" } else { "after it was lengthened next to the equilibrium" };
-            format!(
-                "Newton's method does not lead from the last cycle, {how}, to a {} orbit: {why}\nlikely cause: the cycle \
-                 is still far from it\nwhat to do: follow the branch of cycles further, with a smaller tolerance or \
-                 more `max-points`",
-                curve.hold
-            )
-        })?;
+        let found = growth::polished(&mut problem, &settings, &point)?;
         problem.set_mesh(&found.mesh);
         let row = parameter_row(found.u.len());
         let error = match problem.factorise(&found.u, &row) {
             Ok(()) => problem.truncation(&found.u),
             Err(_) => f64::NAN,
         };
-        let point = found.point;
-        drop(problem);
-        start.point = point;
-        let sizes = start.field.sizes(&start.point.parameters);
+        Ok((found.point, error))
+    };
+    let (point, mut error) = solved(&start, &start.point).map_err(|why| {
+        format!(
+            "Newton's method does not lead from the orbit cut next to the equilibrium to a {} orbit: {why}\nlikely cause: the \
+             orbit is still far from one\nwhat to do: follow the branch of cycles further, with a smaller tolerance or \
+             more `max-points`, or start near another value of the parameter",
+            curve.hold
+        )
+    })?;
+    start.point = point;
+    let (mut longest, mut failed) = (SHORTEST, None);
+    for _ in 0..LENGTHENINGS {
         let goal = MARGIN * tolerance;
-        let at_limit = sizes.iter().all(|size| *size < LEAST);
+        let sizes = start.field.sizes(&start.point.parameters);
+        let at_limit = sizes.iter().zip(start.extents()).all(|(size, extent)| *size < LEAST * extent);
         if error <= goal || at_limit && error <= ENOUGH * tolerance {
             return Ok(start);
         }
@@ -532,12 +561,27 @@ fn settled<'s>(
                  equilibrium is clearly a saddle, or use a larger tolerance"
             ));
         }
-        let share = share_for(goal, error);
         let orbit = start.cycle().ok_or("the orbit is no cycle")?;
+        let share = share_for(goal, error).max(longest);
         let (orbit, parameters) =
             start.field.lengthened(orbit, &start.point.parameters, share).ok_or("the equilibrium is not hyperbolic")?;
-        start.point = bare(&parameters, Solution::Cycle(orbit));
-        coarse = false;
+        let guess = bare(&parameters, Solution::Cycle(orbit));
+        match solved(&start, &guess) {
+            Ok(found) => (start.point, error) = found,
+            // Less far at once.
+            Err(_) if longest < LONGEST => longest = longest.sqrt(),
+            Err(why) => {
+                failed = Some(why);
+                break;
+            }
+        }
     }
-    Err("the truncation error does not decrease when the orbit is lengthened".into())
+    Err(match failed {
+        Some(why) => format!(
+            "the orbit cannot be lengthened next to the equilibrium until the error of its truncation, {error:.1e}, is below \
+             the tolerance: {why}\nlikely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where \
+             the equilibrium is clearly a saddle, or use a larger tolerance"
+        ),
+        None => "the truncation error does not decrease when the orbit is lengthened".into(),
+    })
 }

@@ -31,12 +31,18 @@ const VALUES: usize = 80;
 const BEGIN: f64 = 1e-5;
 /// Number of closest approaches that are compared.
 const PASSES: usize = 3;
-/// Bisections: the values then differ by rounding.
-const BISECTIONS: usize = 45;
-/// Relative accuracy of the trajectories. Newton's method follows.
-const ACCURACY: f64 = 1e-10;
+/// Bisections: the values then differ by the errors of the trajectories.
+const BISECTIONS: usize = 48;
+/// Relative accuracy of the trajectories that are compared …
+const COARSE: f64 = 1e-8;
+/// … and of those that lead to the orbit, on which its closest approach depends.
+const ACCURACY: f64 = 1e-12;
 /// Time that no trajectory takes, in units of the model.
 const LONGEST: f64 = 1e9;
+/// Share of the largest speed below which a trajectory has come to rest.
+const AT_REST: f64 = 1e-8;
+/// Distance at which a trajectory is given up, in units of the sizes of the states.
+const GONE: f64 = 1e3;
 /// Limit on the steps of a trajectory.
 const STEPS: usize = 4_000;
 /// Ratio by which the closest approach must shrink in the bisection; it would not at a jump.
@@ -146,8 +152,14 @@ impl Search<'_> {
     }
 
     /// Closest approaches of both halves of the manifold of dimension one; `forwards` in time from the first saddle, or
-    /// backwards from the second. `refer` `[2][n]` are the direction and l of another value, to which signs refer.
-    fn passes(&self, saddles: &Saddles, forwards: bool, refer: &mut Option<[Vec<f64>; 2]>) -> Option<[Vec<Pass>; 2]> {
+    /// backwards from the second; of one half if `only` is given. `refer` `[2][n]` are the direction and l of another value, to which signs refer.
+    fn passes(
+        &self,
+        saddles: &Saddles,
+        forwards: bool,
+        only: Option<usize>,
+        refer: &mut Option<[Vec<f64>; 2]>,
+    ) -> Option<[Vec<Pass>; 2]> {
         let splits = self.splits(saddles)?;
         let n = self.system.field.dim();
         let side = if forwards { 1.0 } else { -1.0 };
@@ -165,7 +177,20 @@ impl Search<'_> {
             }
         }
         *refer = Some([u.clone(), l.clone()]);
-        Some([1.0, -1.0].map(|half| self.followed(saddles, &splits[to], &l, [from, to], &self.begin(saddles, from, &u, half), side).0))
+        let of = |half: usize| {
+            let accuracy = if only.is_some() { ACCURACY } else { COARSE };
+            if only.is_some_and(|only| only != half) {
+                return Vec::new();
+            }
+            let start = self.begin(saddles, from, &u, if half == 0 { 1.0 } else { -1.0 });
+            self.followed(saddles, &splits[to], &l, [from, to], &start, [side, accuracy]).0
+        };
+        Some([of(0), of(1)])
+    }
+
+    fn tolerance(&self, accuracy: f64) -> Tolerance {
+        let absolute = self.system.scales.iter().map(|scale| BEGIN * accuracy * scale).collect();
+        Tolerance { relative: accuracy, absolute }
     }
 
     fn begin(&self, saddles: &Saddles, from: usize, u: &[f64], half: f64) -> Vec<f64> {
@@ -182,7 +207,7 @@ impl Search<'_> {
         l: &[f64],
         places: [usize; 2],
         start: &[f64],
-        side: f64,
+        [side, accuracy]: [f64; 2],
     ) -> (Vec<Pass>, Vec<(f64, Vec<f64>)>) {
         let system = self.system;
         let (n, target) = (system.field.dim(), &saddles.at[places[1]]);
@@ -198,12 +223,10 @@ impl Search<'_> {
             dot(&split.covector_of(&deviation(x)), &f)
         };
         let section = [Section { value: &approach, direction: Direction::Rising }];
-        let absolute = system.scales.iter().map(|scale| 1e-3 * BEGIN * ACCURACY.sqrt() * scale).collect();
-        let tolerance = Tolerance { relative: ACCURACY, absolute };
-        let integrator =
-            Integrator::new(system.field, &saddles.parameters, tolerance).with_step_limit(STEPS);
+        let tolerance = self.tolerance(accuracy);
+        let integrator = Integrator::new(system.field, &saddles.parameters, tolerance).with_step_limit(STEPS);
         let (mut passes, mut path): (Vec<Pass>, Vec<(f64, Vec<f64>)>) = (Vec::new(), vec![(0.0, start.to_vec())]);
-        let mut farthest = 0.0f64;
+        let (mut farthest, mut fastest) = (0.0f64, 0.0f64);
         let mut x = vec![0.0; n];
         integrator.trajectory(start, [0.0, side * LONGEST], &section, &mut |passage| match passage {
             Passage::Crossing(crossing) => {
@@ -221,7 +244,13 @@ impl Search<'_> {
                     path.push((step.time_at(theta), x.clone()));
                 }
                 farthest = farthest.max(split.size(&deviation(&x)));
-                Verdict::Continue
+                let speed = (0..n).map(|c| (step.end_slope(c) / system.scales[c]).abs()).fold(0.0, f64::max);
+                fastest = fastest.max(speed);
+                // At rest elsewhere, or gone.
+                match speed < AT_REST * fastest || farthest > GONE {
+                    true => Verdict::Stop,
+                    false => Verdict::Continue,
+                }
             }
         });
         (passes, path)
@@ -249,7 +278,7 @@ impl Search<'_> {
         let mut before: Option<(&Saddles, [Vec<Pass>; 2])> = None;
         let mut brackets: Vec<Bracket> = Vec::new();
         for saddles in &all {
-            let own = saddles.as_ref().and_then(|own| Some((own, self.passes(own, forwards, &mut refer)?)));
+            let own = saddles.as_ref().and_then(|own| Some((own, self.passes(own, forwards, None, &mut refer)?)));
             if let (Some((a, first)), Some((b, second))) = (&before, &own) {
                 for half in 0..2 {
                     for (k, (p, q)) in first[half].iter().zip(&second[half]).enumerate() {
@@ -302,7 +331,7 @@ impl Search<'_> {
             });
             let [Some(x0), Some(x1)] = at else { return None };
             let middle = Saddles { parameters, at: [x0, x1] };
-            let Some(own) = self.passes(&middle, forwards, &mut refer)?[half].get(pass).copied() else { break };
+            let Some(own) = self.passes(&middle, forwards, Some(half), &mut refer)?[half].get(pass).copied() else { break };
             if own.across * low.across > 0.0 {
                 (a, low) = (middle, own);
             } else {
@@ -330,16 +359,13 @@ impl Search<'_> {
         let [from, to] = if forwards { [0, 1] } else { [1, 0] };
         let [u, l] = refer?;
         let start = self.begin(saddles, from, &u, if half == 0 { 1.0 } else { -1.0 });
-        let (_, mut path) = self.followed(saddles, &splits[to], &l, [from, to], &start, side);
+        let (_, mut path) = self.followed(saddles, &splits[to], &l, [from, to], &start, [side, ACCURACY]);
         path.retain(|(t, _)| t.abs() <= best.time.abs());
         if !forwards {
             path.reverse();
         }
         let (t0, t1) = (path.first()?.0, path.last()?.0);
-        let tolerance = Tolerance {
-            relative: ACCURACY,
-            absolute: self.system.scales.iter().map(|scale| 1e-3 * BEGIN * ACCURACY.sqrt() * scale).collect(),
-        };
+        let tolerance = self.tolerance(ACCURACY);
         let integrator = Integrator::new(self.system.field, &saddles.parameters, tolerance).with_step_limit(STEPS);
         let scheme = Scheme::new(self.degree);
         let mut profile = Vec::new();

@@ -155,11 +155,29 @@ impl Monitor for OnConnection<'_> {
         // Test functions jump where the leading eigenvalues become others.
         const NEAR: f64 = 1e-4;
         if self.is_flip() {
-            return self.turning(at).is_some_and(|own| own.value.abs() < NEAR);
+            return self.turning(at).is_some();
         }
         let Some((own, value)) = self.own(at).zip(self.tested(at)) else { return false };
         let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
         value.abs() < NEAR * size * if self.kind == Kind::DoubleEigenvalue { size } else { 1.0 }
+    }
+
+    // Where a test function vanishes along the whole curve, as the saddle quantity of a conservative model does, its signs are
+    // those of rounding errors.
+    fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
+        const ROUNDING: f64 = 1e-9;
+        /// Largest ratio of the test function at its zero to that at the ends: it jumps where another eigenvalue takes the lead.
+        const JUMPS: f64 = 0.01;
+        if self.is_flip() {
+            let size = |at: &Point| self.turning(at).map_or(f64::NAN, |own| own.value.abs());
+            return size(at) < JUMPS * size(ends[0]).min(size(ends[1]));
+        }
+        let clear = |end: &&Point| {
+            let Some((own, value)) = self.own(end).zip(self.tested(end)) else { return true };
+            let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+            value.abs() > ROUNDING * size
+        };
+        self.confirms(at) && ends.iter().any(clear)
     }
 
     fn reads(&self) -> Sight {

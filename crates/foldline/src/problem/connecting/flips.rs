@@ -11,7 +11,7 @@
 //!
 //! ```text
 //!   (1)  ⟨p_s, y_1⟩ / |y_1|,      ⟨p_u, y_0⟩ / |y_0|          orbit flips
-//!   (2)  ⟨q_s, ψ(0)⟩ / |ψ(0)|,    ⟨q_u, ψ(1)⟩ / |ψ(1)|        inclination flips
+//!   (2)  ⟨q_s, ψ(0)⟩ exp(|λ_s| T/2),   ⟨q_u, ψ(1)⟩ exp(λ_u T/2)    inclination flips
 //!   (3)  ψ_j = Φ_jᵀ ψ_{j+1},   P_uᵀ(x_0) ψ_0 = 0,   P_sᵀ(x_1) ψ_M = 0
 //! ```
 //!
@@ -92,14 +92,16 @@ impl ConnectingField<'_> {
         let wanted = at.iter().any(|(end, side)| leading(&values[*end], *side).is_some());
         let adjoint = if wanted { self.adjoint(orbit, parameters) } else { None };
         let inclination_flip = |end: usize, side: f64| {
-            let q = eigenvector(&places[end].a, leading(&values[end], side)?, n)?;
+            let rate = leading(&values[end], side)?;
+            let q = eigenvector(&places[end].a, rate, n)?;
             let psi = adjoint.as_ref()?;
             let last = psi.len() / n - 1;
             let own = &psi[end * last * n..][..n];
             let every = last / SAMPLES;
             let samples = (0..=SAMPLES).flat_map(|k| psi[k * every * n..][..n].iter());
             let refer = samples.flat_map(|x| q.iter().map(move |q| x * q)).collect();
-            Some(Turning { value: dot(&q, own) / dot(own, own).sqrt(), refer })
+            let grown = (0.5 * rate.abs() * self.time_unit(parameters)).exp();
+            Some(Turning { value: grown * dot(&q, own), refer })
         };
         [orbit_flip(1, -1.0), orbit_flip(0, 1.0), inclination_flip(0, -1.0), inclination_flip(1, 1.0)]
     }
