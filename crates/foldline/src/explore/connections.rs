@@ -25,7 +25,7 @@ use std::ops::Range;
 /// Factor on the plan's tolerance, as for other curves.
 const SHARPER: f64 = 0.2;
 /// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
-const MARGIN: f64 = 0.02;
+const MARGIN: f64 = 0.1;
 /// Largest estimated error of the truncation, in tolerances, of an orbit whose ends are so close to the equilibria that rounding
 /// would matter next.
 const ENOUGH: f64 = 0.5;
@@ -38,7 +38,7 @@ const LONGEST: f64 = 0.6;
 /// Relative correction at which Newton's method has all but converged.
 const CLOSE: f64 = 1e-4;
 /// Smallest distance from the equilibria, relative to the largest on the orbit, at which rounding does not matter yet.
-const LEAST: f64 = 1e-7;
+const LEAST: f64 = 1e-6;
 
 /// Follows a curve of connecting orbits, or the part of it that is missing; `parent` is the branch at whose end it
 /// starts. Returns the curve, and false if the observer wants to stop.
@@ -426,11 +426,20 @@ impl Departure<'_> {
         [0, 1].map(|end| [-1.0, 1.0].map(|side| self.splits[end].length(&ys[end], side)))
     }
 
+    /// Share of nonlinear terms in the speed at a time in periods, as seen from the saddle of an end.
+    fn nonlinearity(&self, t: f64, end: usize) -> f64 {
+        let x = self.cycle.state(t);
+        let y = &self.field.deviations([&x, &x], self.probe)[end];
+        self.field.nonlinearity(end, y, self.probe)
+    }
+
     /// Times, in periods, at which the cycle leaves the neighbourhood of one saddle and enters that of the other, and
     /// the sizes of these: a share of the largest distance, or more if the cycle is not that close.
     fn piece(&self) -> Option<(f64, f64, [f64; 2])> {
         const SAMPLES: usize = 4000;
         const SHARE: f64 = 0.05;
+        /// Largest share of nonlinear terms in the speed at the cut.
+        const NONLINEAR: f64 = 0.3;
         let time = |k: usize| self.times[0] + (self.times[1] - self.times[0]) * k as f64 / SAMPLES as f64;
         let all: Vec<[[f64; 2]; 2]> = (0..=SAMPLES).map(|k| self.parts(time(k))).collect();
         let size = |end: usize| {
@@ -438,7 +447,10 @@ impl Departure<'_> {
             let half = if end == 0 { 0..SAMPLES / 2 } else { SAMPLES / 2..SAMPLES + 1 };
             let near = lengths(half).fold(f64::INFINITY, f64::min);
             let far = lengths(0..SAMPLES + 1).fold(0.0, f64::max);
-            let size = (SHARE * far).max(2.0 * near);
+            let at = |k: &usize| if end == 0 { *k } else { SAMPLES - k };
+            let linear = |k: &usize| self.nonlinearity(time(at(k)), end) < NONLINEAR;
+            let reach = (0..SAMPLES / 2).take_while(linear).map(|k| all[at(&k)][end][1 - end]).fold(0.0, f64::max);
+            let size = (SHARE * far).min(reach).max(2.0 * near);
             (size < 0.5 * far).then_some(size)
         };
         let sizes = [size(0)?, size(1)?];
@@ -570,6 +582,7 @@ fn settled<'s>(
             Ok(found) => (start.point, error) = found,
             // Less far at once.
             Err(_) if longest < LONGEST => longest = longest.sqrt(),
+            Err(_) if error <= ENOUGH * tolerance => return Ok(start),
             Err(why) => {
                 failed = Some(why);
                 break;

@@ -170,7 +170,8 @@ impl Monitor for OnConnection<'_> {
         const JUMPS: f64 = 0.01;
         if self.is_flip() {
             let size = |at: &Point| self.turning(at).map_or(f64::NAN, |own| own.value.abs());
-            return size(at) < JUMPS * size(ends[0]).min(size(ends[1]));
+            let [left, right] = [size(ends[0]), size(ends[1])];
+            return size(at) < JUMPS * left.max(right) && size(at) < 0.5 * left.min(right);
         }
         let clear = |end: &&Point| {
             let Some((own, value)) = self.own(end).zip(self.tested(end)) else { return true };

@@ -12,11 +12,11 @@
 //!   (2)  f(x_i, p) = 0
 //!   (3)  Q_0 P_s(A_0) (x(0) - x_0) = 0             n_s rows
 //!   (4)  Q_1 P_u(A_1) (x(1) - x_1 - g) = 0         n_u rows
-//!   (5)  ⟨e_0, x(0) - x_0⟩ = 1,   ⟨e_1, x(1) - x_1 - g⟩ = 1
+//!   (5)  ⟨e_0, x(0) - x_0⟩ = ε_0,   ⟨e_1, x(1) - x_1 - g⟩ = ε_1
 //! ```
 //!
 //! Rows Q_i span those of the projectors at a reference solution. With its deviations y_i from the equilibria, and H of
-//! `splitting`, e_0 = P_uᵀ H y_0 / ε_0², e_1 = P_sᵀ H y_1 / ε_1², ε_i = |y_i|: the orbit is cut off where it crosses the plane (5) transversally, at the
+//! `splitting`, e_0 = P_uᵀ H y_0 / ε_0, e_1 = P_sᵀ H y_1 / ε_1, ε_i = |y_i|: the orbit is cut off where it crosses the plane (5) transversally, at the
 //! distance ε_i. (5) fixes both T and the phase. The orbit exists if n_u(x_0) + n_s(x_1) = n, for isolated values of
 //! one parameter.
 //!
@@ -211,6 +211,16 @@ impl<'a> ConnectingField<'a> {
     /// Size of a state.
     pub fn scale(&self, state: usize) -> f64 {
         self.scales[state]
+    }
+
+    /// |f(x_i + y) - A_i y| / |A_i y| for a deviation `y` `[n]` from the equilibrium of an end.
+    pub fn nonlinearity(&self, end: usize, y: &[f64], parameters: &[f64]) -> f64 {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let there: Vec<f64> = (0..self.dim()).map(|c| at.state[c] + y[c] * self.scales[c]).collect();
+        let linear = times(&at.a, y);
+        let beyond = self.saddle(&there, parameters, &[]).f;
+        let rest: Vec<f64> = beyond.iter().zip(&at.f).zip(&linear).map(|((b, f), l)| b - f - l).collect();
+        max_abs(&rest) / max_abs(&linear)
     }
 
     /// Turns g of angles.
@@ -479,7 +489,7 @@ impl VectorField for ConnectingField<'_> {
                 put(values, &place, 0.0, &varied);
             }
             // (5)
-            put(&parameters[self.plane(end)], &place, 1.0, &[]);
+            put(&parameters[self.plane(end)], &place, self.sizes(parameters)[end], &[]);
         }
     }
 
@@ -498,7 +508,7 @@ impl VectorField for ConnectingField<'_> {
             }
             // The plane passes through the point itself, so that a new reference does not move the solution.
             let plane = self.plane(end);
-            parameters[plane].iter_mut().zip(&along).for_each(|(e, h)| *e = h / reached);
+            parameters[plane].iter_mut().zip(&along).for_each(|(e, h)| *e = h * length / reached);
             let hidden = self.hidden();
             parameters[hidden + end] = length;
             let rows = ranges[end].len() / n;
