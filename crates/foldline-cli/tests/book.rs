@@ -37,6 +37,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
     }
     let others = [
         "boundary-value-problems",
+        "connecting-orbits",
         "contact",
         "friction",
         "endings",

@@ -290,7 +290,7 @@ impl Marker {
             Kind::Homoclinic | Kind::Heteroclinic => Marker::Dot,
             Kind::NeutralSaddle => Marker::Circle,
             Kind::DoubleEigenvalue | Kind::ThreeLeading => Marker::Triangle,
-            Kind::OrbitFlip => Marker::Cross,
+            Kind::OrbitFlip | Kind::InclinationFlip => Marker::Cross,
             Kind::NonCentral => Marker::Nabla,
             Kind::ShilnikovHopf => Marker::Diamond,
             Kind::Unexplained => Marker::Star,

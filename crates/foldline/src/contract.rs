@@ -3,7 +3,7 @@
 //! **Idea.** The rest of the crate is written against these few object-safe traits. A model may therefore be text,
 //! traced code or native Rust, and a curve may consist of equilibria, cycles or solutions of a new kind of problem.
 
-use crate::diagram::{Branch, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
+use crate::diagram::{Branch, Cycle, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.
@@ -31,6 +31,15 @@ pub struct Batch<'a> {
     /// (Filippov's combination of both branches). Empty: the branch in force at each point. A branch that is undefined
     /// at a point, such as a root whose argument is positive on one side only, is replaced by the one in force.
     pub signs: &'a [f64],
+}
+
+/// A test function whose sign depends on those of eigenvectors.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Turning {
+    /// Value.
+    pub value: f64,
+    /// Vector with the same dependence: two values have comparable signs if the product of their vectors is positive.
+    pub refer: Vec<f64>,
 }
 
 /// A vector field x' = f(x, p), x ∈ ℝⁿ, p ∈ ℝᵏ, with exact derivatives, evaluated for a batch of points at once.
@@ -200,6 +209,18 @@ pub trait VectorField: Send + Sync {
 
     /// For orbits that connect equilibria, the eigenvalues at the one where they begin and at the one where they end.
     fn saddles(&self, _parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+        None
+    }
+
+    /// For orbits that connect equilibria, test functions of orbit flips at the end and at the start, and of inclination
+    /// flips of the stable and the unstable manifold; `None` where the leading eigenvalue is complex or the only one.
+    fn flips(&self, _orbit: &Cycle, _parameters: &[f64]) -> [Option<Turning>; 4] {
+        Default::default()
+    }
+
+    /// An orbit that connects equilibria, and its parameters, continued approximately until its ends are closer to them by
+    /// the factor `share`.
+    fn lengthened(&self, _orbit: &Cycle, _parameters: &[f64], _share: f64) -> Option<(Cycle, Vec<f64>)> {
         None
     }
 

@@ -1,6 +1,7 @@
 //! `[[curve]]`: special points continued in two parameters.
 
 use super::branches::{bounds, free, marks, range, switch_step};
+use super::seeds::state;
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
@@ -9,12 +10,13 @@ use foldline::diagram::{Family, Kind, Shown};
 use foldline::explore::{BranchPlan, CurvePlan, Start};
 use foldline::model::Parameter;
 
-pub(super) const KEYS: [&str; 12] = [
+pub(super) const KEYS: [&str; 13] = [
     "name",
     "description",
     "hold",
     "of",
     "near",
+    "to",
     "free",
     "range",
     "branch-range",
@@ -23,7 +25,7 @@ pub(super) const KEYS: [&str; 12] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 7] = [
+const HELD: [Kind; 9] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -31,6 +33,8 @@ const HELD: [Kind; 7] = [
     Kind::Torus,
     Kind::Grazing,
     Kind::BoundaryEquilibrium,
+    Kind::Homoclinic,
+    Kind::Heteroclinic,
 ];
 
 /// Branch on which the special point lies.
@@ -67,6 +71,7 @@ pub(super) fn read(
     let first = base.as_ref().map(|base| &ground.model.parameters[base.plan.free]);
     let branch_range = branch_range(walk, item, base.as_ref(), first);
     let near = near(walk, item, branch_range, first);
+    let to = to(walk, item, ground, hold, base.as_ref().and_then(|base| base.family));
     let second = second(walk, item, ground, base.as_ref());
     let max_points = max_points(walk, item);
     let marks = marks(walk, table, ground.model);
@@ -94,6 +99,7 @@ pub(super) fn read(
         hold,
         of: base.name,
         near: near.flatten(),
+        to: to?,
         free,
         ranges: [branch_range, range],
         until,
@@ -201,10 +207,6 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }
-        (Kind::Homoclinic | Kind::Heteroclinic, Some(Family::Equilibrium)) => Some((
-            "a connecting orbit is the limit of cycles, not of equilibria",
-            "homoclinic or heteroclinic, `of` a branch of cycles",
-        )),
         (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
             "equilibria have only folds, branch points and Hopf points",
             "fold, branch-point or hopf, or a branch of cycles",
@@ -259,6 +261,35 @@ fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&Pa
         walk.report(value.span(), message, "a value within the range, or a wider `branch-range`");
     }
     Some(Some(near))
+}
+
+/// Reads the state near the second equilibrium of a heteroclinic orbit, which starts of a branch of equilibria only;
+/// `Some(None)` if it is not given.
+fn to(
+    walk: &mut Walk,
+    item: &Item,
+    ground: &Ground,
+    hold: Option<Kind>,
+    family: Option<Family>,
+) -> Option<Option<Vec<f64>>> {
+    let Some(value) = item.table.get("to") else {
+        if let (Some(Kind::Heteroclinic), Some(Family::Equilibrium)) = (hold, family) {
+            let message = "an orbit from an equilibrium of this branch needs a second equilibrium";
+            walk.report(item.span.clone(), message, "add `to = { … }`, a state near it, or `of` a branch of cycles");
+            return None;
+        }
+        return Some(None);
+    };
+    let wrong = match (hold, family) {
+        (Some(Kind::Heteroclinic), Some(Family::Equilibrium) | None) => None,
+        (Some(Kind::Heteroclinic), _) => Some("the equilibria are those that the cycles approach"),
+        _ => Some("`to` is the second equilibrium of a heteroclinic orbit"),
+    };
+    if let Some(message) = wrong {
+        walk.report(value.span(), message, "leave out `to`");
+        return None;
+    }
+    state(walk, value, ground.model).map(Some)
 }
 
 /// Reads the second parameter, which must differ from that of the branch.

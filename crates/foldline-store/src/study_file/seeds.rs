@@ -227,7 +227,7 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
 
 /// Reads a number for each state, or `"zero"` for a state of zeros. The name of a repeated state stands for all its
 /// elements, with one number or a list.
-fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
+pub(super) fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
     if value.get_ref().as_str() == Some("zero") {
         return Some(vec![0.0; model.states.len()]);
     }

@@ -383,6 +383,8 @@ pub enum Kind {
     ThreeLeading,
     /// On a curve of connecting orbits: the orbit returns outside of the leading eigenspace.
     OrbitFlip,
+    /// On a curve of connecting orbits: an invariant manifold returns tangent to an exceptional direction.
+    InclinationFlip,
     /// On a curve of homoclinic orbits: the saddle becomes a saddle-node, at which the orbit is non-central.
     NonCentral,
     /// On a curve of homoclinic orbits: the equilibrium has a Hopf bifurcation (Shilnikov–Hopf).
@@ -391,7 +393,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 35] = [
+    pub const ALL: [Kind; 36] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -425,6 +427,7 @@ impl Kind {
         Kind::DoubleEigenvalue,
         Kind::ThreeLeading,
         Kind::OrbitFlip,
+        Kind::InclinationFlip,
         Kind::NonCentral,
         Kind::ShilnikovHopf,
     ];
@@ -491,6 +494,7 @@ impl Kind {
             Kind::DoubleEigenvalue => "double-eigenvalue",
             Kind::ThreeLeading => "three-leading-eigenvalues",
             Kind::OrbitFlip => "orbit-flip",
+            Kind::InclinationFlip => "inclination-flip",
             Kind::NonCentral => "saddle-node-homoclinic",
             Kind::ShilnikovHopf => "shilnikov-hopf",
         }
@@ -519,6 +523,7 @@ impl Kind {
             Kind::DoubleEigenvalue => "double eigenvalue",
             Kind::ThreeLeading => "three leading eigenvalues",
             Kind::OrbitFlip => "orbit flip",
+            Kind::InclinationFlip => "inclination flip",
             Kind::NonCentral => "saddle-node homoclinic",
             Kind::ShilnikovHopf => "Shilnikov–Hopf",
             other => other.name(),
@@ -805,6 +810,9 @@ impl fmt::Display for Ending {
             }
             Ending::Joined { at: Kind::BoundaryEquilibrium, parameter } => {
                 write!(f, "ends at {:.9}, where the equilibrium reaches the surface of an event", Shown(*parameter))
+            }
+            Ending::Joined { at: at @ (Kind::NonCentral | Kind::ShilnikovHopf), parameter } => {
+                write!(f, "ends at {at} {:.6}, where the equilibrium is no saddle any more", Shown(*parameter))
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),

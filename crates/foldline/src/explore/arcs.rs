@@ -10,12 +10,13 @@ use crate::continuation::corrector::parameter_row;
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cycle, Point, Solution};
 
+/// Relative correction at which undamped steps converge.
+const CLOSE: f64 = 0.1;
+
 /// Unknowns near a solution, by damped Newton steps at fixed parameters from a guess that may be far away; `None` if
-/// none of them helps. A step is halved until the correction that would follow it, with the same matrix, is shorter: the
+/// none of them helps. The steps end with the first relative correction below `close`. A step is halved until the correction that would follow it, with the same matrix, is shorter: the
 /// natural monotonicity test (deuflhard2011, §3.1), which does not depend on the units of the equations.
-pub(super) fn damped(problem: &mut dyn ZeroProblem, guess: &Point) -> Option<Vec<f64>> {
-    /// Relative correction at which undamped steps converge.
-    const CLOSE: f64 = 0.1;
+pub(super) fn damped(problem: &mut dyn ZeroProblem, guess: &Point, close: f64) -> Option<Vec<f64>> {
     /// A bound on the work; each step costs one matrix.
     const STEPS: usize = 40;
     /// Smallest damping factor: below it, the test fails because of a singular matrix on the way.
@@ -31,7 +32,7 @@ pub(super) fn damped(problem: &mut dyn ZeroProblem, guess: &Point) -> Option<Vec
         r[size - 1] = 0.0;
         problem.factorise(&u, &row).ok()?;
         problem.solve(&r, &mut step);
-        if problem.relative_size(&step, &u) < CLOSE {
+        if problem.relative_size(&step, &u) < close {
             return Some(u);
         }
         let length = problem.dot(&step, &step);
@@ -65,7 +66,7 @@ pub(super) fn from_arc(system: &System, seed: &SeedPlan, tolerance: f64, guess: 
     let free = (0..).find(|k| !system.field.determined().contains(k)).unwrap_or(0);
     let mut given = bare(&seed.parameters, Solution::Cycle(guess.clone()));
     let mut problem = problem_of(system, free, guess.degree, &given, false);
-    if let Some(u) = damped(&mut *problem, &given) {
+    if let Some(u) = damped(&mut *problem, &given, CLOSE) {
         given.solution = problem.point(&u, &[], Examination::default()).solution;
     }
     first(&mut *problem, &settings, &given).map(|found| found.point).map_err(|failure| {

@@ -10,25 +10,34 @@ use super::arcs::damped;
 use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use super::seeds::bare;
-use crate::continuation::Settings;
+use super::shooting::Search;
+use crate::continuation::{Failure, Settings};
 use crate::continuation::corrector::parameter_row;
 use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution};
 use crate::linalg::{lu, max_abs};
+use crate::problem::connecting::longer::sampled;
 use crate::problem::connecting::{ConnectingField, Split};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::gauss::Scheme;
+use std::ops::Range;
 
 /// Factor on the plan's tolerance, as for other curves.
 const SHARPER: f64 = 0.2;
 /// Estimated error of the truncation at the start of a curve, in tolerances: it changes along the curve.
-const MARGIN: f64 = 0.02;
+const MARGIN: f64 = 0.1;
 /// Largest estimated error of the truncation, in tolerances, of an orbit whose ends are so close to the equilibria that rounding
 /// would matter next.
 const ENOUGH: f64 = 0.5;
-/// Number of times that an orbit is lengthened. The error is at least quartered each time.
-const LENGTHENINGS: usize = 14;
-/// Smallest distance from the equilibria, in units of the sizes of the states, at which rounding does not matter yet.
+/// Number of times that an orbit is lengthened: a bound on the work.
+const LENGTHENINGS: usize = 40;
+/// Smallest factor by which the distances from the equilibria are reduced at once …
+const SHORTEST: f64 = 0.05;
+/// … and the one at which a further failure counts.
+const LONGEST: f64 = 0.6;
+/// Relative correction at which Newton's method has all but converged.
+const CLOSE: f64 = 1e-4;
+/// Smallest distance from the equilibria, relative to the largest on the orbit, at which rounding does not matter yet.
 const LEAST: f64 = 1e-6;
 
 /// Follows a curve of connecting orbits, or the part of it that is missing; `parent` is the branch at whose end it
@@ -49,7 +58,7 @@ pub(super) fn follow(
     };
     let parameter = start.as_ref().map_or(f64::NAN, |start| start.point.parameters[first]);
     let origin = match curve.hold {
-        Kind::Homoclinic | Kind::Heteroclinic => Origin::EndOf(parent.name.clone()),
+        Kind::Homoclinic | Kind::Heteroclinic if parent.family == Family::Cycle => Origin::EndOf(parent.name.clone()),
         kind => Origin::Switch { parent: parent.name.clone(), kind, parameter },
     };
     let mut branch = known.cloned().unwrap_or_else(|| Branch::new(&curve.name, Family::Arc, curve.free, origin));
@@ -133,7 +142,19 @@ impl<'s> Start<'s> {
         }
     }
 
-    /// Sizes ε of the point.
+    /// Largest distances of the orbit from the equilibria.
+    fn extents(&self) -> [f64; 2] {
+        let (n, parameters) = (self.field.dim(), &self.point.parameters);
+        let profile = self.cycle().map_or(&[][..], |cycle| &cycle.profile);
+        let far = |end: usize| {
+            let split = self.field.split(end, parameters)?;
+            let sizes = profile.chunks_exact(n).map(|x| split.size(&self.field.deviations([x, x], parameters)[end]));
+            Some(sizes.fold(0.0, f64::max))
+        };
+        [0, 1].map(|end| far(end).unwrap_or(f64::NAN))
+    }
+
+    /// The orbit.
     fn cycle(&self) -> Option<&Cycle> {
         match &self.point.solution {
             Solution::Cycle(cycle) => Some(cycle),
@@ -170,6 +191,9 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
              several values of the second parameter",
             curve.hold
         ));
+    }
+    if parent.family == Family::Equilibrium {
+        return shot(system, plan, curve, parent);
     }
     let value = |point: &Point| point.parameters.get(parent.free).copied().unwrap_or(f64::NAN);
     let unbounded = |ending: &Option<Ending>| match ending {
@@ -227,7 +251,7 @@ fn slow_points(system: &System, cycle: &Cycle, parameters: &[f64]) -> Vec<(f64, 
 }
 
 /// The equilibrium to which Newton's method leads from `x`.
-fn equilibrium(system: &System, x: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn equilibrium(system: &System, x: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
     const ITERATIONS: usize = 30;
     let (n, mut x) = (x.len(), x.to_vec());
     for _ in 0..ITERATIONS {
@@ -304,17 +328,39 @@ fn cut<'s>(
              many unstable eigenvalues are followed"
         ));
     }
-    let field = ConnectingField::new(system.field, &system.scales, if between_two { 2 } else { 1 }, count);
     let gain: &[f64] = if between_two { &[] } else { &cycle.gain };
-    let probe = field.parameters(&point.parameters, 1.0, &places, [1.0; 2], gain);
-    let splits = [0, 1].map(|end| field.split(end, &probe));
-    let [Some(left), Some(right)] = &splits else { return Err("an equilibrium is not hyperbolic".into()) };
-    let sides = Departure { field: &field, splits: [left, right], probe: &probe, cycle, times: [begin, until] };
-    let (from, to, sizes) = sides.piece().ok_or_else(|| {
+    let orbit = Orbit { parameters: &point.parameters, cycle, times: [begin, until], places: &places, count, gain };
+    let start = pieced(system, plan, &orbit)?.ok_or_else(|| {
         "the last cycle does not come close enough to the equilibrium\nlikely cause: its period is not long yet\nwhat to \
          do: follow the branch of cycles further, with more `max-points`"
             .to_string()
     })?;
+    settled(system, plan, curve, first, start)
+}
+
+/// An orbit that leaves one saddle and comes close to another, or the same.
+struct Orbit<'o> {
+    parameters: &'o [f64],
+    cycle: &'o Cycle,
+    /// Times, in periods, at which the orbit is next to the saddles.
+    times: [f64; 2],
+    /// The saddles, or the only one.
+    places: &'o [f64],
+    /// Number of their unstable eigenvalues.
+    count: usize,
+    gain: &'o [f64],
+}
+
+/// The piece of an orbit between its departure from the first and its arrival at the second saddle; `None` if it does not
+/// come close enough.
+fn pieced<'s>(system: &'s System, plan: &Plan, orbit: &Orbit) -> Result<Option<Start<'s>>, String> {
+    let (n, cycle) = (system.field.dim(), orbit.cycle);
+    let field = ConnectingField::new(system.field, &system.scales, orbit.places.len() / n, orbit.count);
+    let probe = field.parameters(orbit.parameters, 1.0, orbit.places, [1.0; 2], orbit.gain);
+    let splits = [0, 1].map(|end| field.split(end, &probe));
+    let [Some(left), Some(right)] = &splits else { return Err("an equilibrium is not hyperbolic".into()) };
+    let sides = Departure { field: &field, splits: [left, right], probe: &probe, cycle, times: orbit.times };
+    let Some((from, to, sizes)) = sides.piece() else { return Ok(None) };
     let length = (to - from) * cycle.period;
     let scheme = Scheme::new(plan.degree);
     let inner = (0..3).flat_map(|turn| cycle.mesh.iter().map(move |t| t + f64::from(turn) - 1.0));
@@ -324,7 +370,7 @@ fn cut<'s>(
     mesh.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
     let profile = sampled(&mesh, &scheme, &|t| cycle.state(t));
     let mesh: Vec<f64> = mesh.iter().map(|t| (t - from) / (to - from)).collect();
-    let parameters = field.parameters(&point.parameters, length, &places, sizes, gain);
+    let parameters = field.parameters(orbit.parameters, length, orbit.places, sizes, orbit.gain);
     let solution = Cycle {
         points: crate::problem::gauss::Points::Gauss,
         period: length,
@@ -335,13 +381,32 @@ fn cut<'s>(
         gain: vec![0.0; n],
     };
     drop(splits);
-    settled(system, plan, curve, first, Start { field, point: bare(&parameters, Solution::Cycle(solution)) })
+    Ok(Some(Start { field, point: bare(&parameters, Solution::Cycle(solution)) }))
 }
 
-/// States at the nodes of a mesh, from a function of time.
-fn sampled(mesh: &[f64], scheme: &Scheme, state: &dyn Fn(f64) -> Vec<f64>) -> Vec<f64> {
-    let nodes = mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
-    nodes.flat_map(state).collect()
+/// The connecting orbit of saddles on a branch of equilibria, found by shooting.
+fn shot<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branch) -> Result<Start<'s>, String> {
+    let search = Search {
+        system,
+        free: parent.free,
+        range: curve.ranges[0],
+        near: curve.near,
+        to: curve.to.clone(),
+        degree: plan.degree,
+    };
+    let found = search.found(parent)?;
+    let count = unstable(system, &found.places[..system.field.dim()], &found.parameters)
+        .ok_or("an equilibrium is not hyperbolic")?;
+    let orbit = Orbit {
+        parameters: &found.parameters,
+        cycle: &found.cycle,
+        times: [0.0, 1.0 - 1e-9],
+        places: &found.places,
+        count,
+        gain: &[],
+    };
+    let start = pieced(system, plan, &orbit)?.ok_or("the orbit found by shooting does not come close enough to the saddle")?;
+    settled(system, plan, curve, parent.free, start)
 }
 
 /// A cycle between the saddle that it leaves and the one that it arrives at.
@@ -362,17 +427,31 @@ impl Departure<'_> {
         [0, 1].map(|end| [-1.0, 1.0].map(|side| self.splits[end].length(&ys[end], side)))
     }
 
+    /// Share of nonlinear terms in the speed at a time in periods, as seen from the saddle of an end.
+    fn nonlinearity(&self, t: f64, end: usize) -> f64 {
+        let x = self.cycle.state(t);
+        let y = &self.field.deviations([&x, &x], self.probe)[end];
+        self.field.nonlinearity(end, y, self.probe)
+    }
+
     /// Times, in periods, at which the cycle leaves the neighbourhood of one saddle and enters that of the other, and
     /// the sizes of these: a share of the largest distance, or more if the cycle is not that close.
     fn piece(&self) -> Option<(f64, f64, [f64; 2])> {
         const SAMPLES: usize = 4000;
         const SHARE: f64 = 0.05;
+        /// Largest share of nonlinear terms in the speed at the cut.
+        const NONLINEAR: f64 = 0.3;
         let time = |k: usize| self.times[0] + (self.times[1] - self.times[0]) * k as f64 / SAMPLES as f64;
         let all: Vec<[[f64; 2]; 2]> = (0..=SAMPLES).map(|k| self.parts(time(k))).collect();
         let size = |end: usize| {
-            let lengths = || all.iter().map(move |own| own[end][0].hypot(own[end][1]));
-            let (far, near) = (lengths().fold(0.0, f64::max), lengths().fold(f64::INFINITY, f64::min));
-            let size = (SHARE * far).max(3.0 * near);
+            let lengths = |of: Range<usize>| all[of].iter().map(move |own| own[end][0].hypot(own[end][1]));
+            let half = if end == 0 { 0..SAMPLES / 2 } else { SAMPLES / 2..SAMPLES + 1 };
+            let near = lengths(half).fold(f64::INFINITY, f64::min);
+            let far = lengths(0..SAMPLES + 1).fold(0.0, f64::max);
+            let at = |k: &usize| if end == 0 { *k } else { SAMPLES - k };
+            let linear = |k: &usize| self.nonlinearity(time(at(k)), end) < NONLINEAR;
+            let reach = (0..SAMPLES / 2).take_while(linear).map(|k| all[at(&k)][end][1 - end]).fold(0.0, f64::max);
+            let size = (SHARE * far).min(reach).max(2.0 * near);
             (size < 0.5 * far).then_some(size)
         };
         let sizes = [size(0)?, size(1)?];
@@ -382,23 +461,64 @@ impl Departure<'_> {
     }
 }
 
+/// Factor on the distances from the equilibria that brings the error of the truncation, which is of second order, to half of
+/// `goal`.
+fn share_for(goal: f64, error: f64) -> f64 {
+    (0.5 * goal / error).sqrt().clamp(SHORTEST, 0.5)
+}
+
+/// The point of a curve with its orbit lengthened, if the error of the truncation is what limits the curve there.
+pub(super) fn relengthened(growth: &Growth, system: &System, line: &Line, at: &Point) -> Option<Point> {
+    /// Share of the tolerance from which on the truncation matters.
+    const MATTERS: f64 = 0.25;
+    let Solution::Cycle(orbit) = &at.solution else { return None };
+    let of = |point: &Point, orbit: &Cycle| CycleProblem::like(line.setting(system, &point.parameters), orbit);
+    let mut problem = of(at, orbit);
+    let u = problem.unknowns_of(at);
+    problem.anchor(&u);
+    problem.factorise(&u, &parameter_row(u.len())).ok()?;
+    let (error, tolerance) = (problem.truncation(&u), growth.settings.tolerance);
+    if error.is_nan() || error < MATTERS * tolerance {
+        return None;
+    }
+    drop(problem);
+    let share = share_for(MARGIN * tolerance, error);
+    let found = [share, share.sqrt(), share.powf(0.25)].into_iter().find_map(|share| {
+        let (longer, parameters) = system.field.lengthened(orbit, &at.parameters, share)?;
+        let mut start = bare(&parameters, Solution::Cycle(longer.clone()));
+        let mut problem = of(&start, &longer);
+        if let Some(u) = damped(&mut problem, &start, CLOSE) {
+            start = problem.point(&u, &[], Examination::default());
+        }
+        growth::polished(&mut problem, growth.settings, &start).ok()
+    })?;
+    let mut point = Point { position: at.position, step: at.step, ..found.point };
+    // The direction of the curve is that of its scalars.
+    let scalars = system.field.determined().len() + 2;
+    let along: f64 = point.tangent.iter().rev().zip(at.tangent.iter().rev()).take(scalars).map(|(a, b)| a * b).sum();
+    if along < 0.0 {
+        point.tangent.iter_mut().for_each(|t| *t = -*t);
+    }
+    Some(point)
+}
+
 /// The problem of the orbit in the branch's parameter, with the second one last, which stays.
-fn problem_of<'s>(start: &'s Start, system: &'s System, first: usize, free: usize, degree: usize) -> CycleProblem<'s> {
+fn problem_of<'s>(point: &Point, system: &'s System, first: usize, free: usize) -> CycleProblem<'s> {
     let line = Line { held: Some((Kind::Homoclinic, first)), ..Line::new(free) };
-    let setting = line.setting(system, &start.point.parameters);
-    let cycle = match &start.point.solution {
+    let setting = line.setting(system, &point.parameters);
+    let cycle = match &point.solution {
         Solution::Cycle(cycle) => cycle.clone(),
         Solution::Equilibrium(_) | Solution::Torus(_) => Cycle {
             points: crate::problem::gauss::Points::Gauss,
             period: 1.0,
             forcing_periods: 1,
             mesh: vec![0.0, 1.0].into(),
-            degree,
+            degree: 4,
             profile: Vec::new(),
             gain: Vec::new(),
         },
     };
-    CycleProblem::like(setting, &cycle)
+    CycleProblem::like(setting, &cycle).without_truncation()
 }
 
 /// Solves for the orbit at fixed values of all parameters but the first, and lengthens it until its truncation does not
@@ -411,36 +531,40 @@ fn settled<'s>(
     mut start: Start<'s>,
 ) -> Result<Start<'s>, String> {
     let tolerance = SHARPER * plan.tolerance;
-    let mut coarse = true;
-    for _ in 0..LENGTHENINGS {
+    let system = start.system(base);
+    let settings = growth::settings(&system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    drop(system);
+    let solved = |start: &Start, point: &Point| -> Result<(Point, f64), Failure> {
         let system = start.system(base);
-        let settings = growth::settings(&system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
-        let mut problem = problem_of(&start, &system, first, curve.free, plan.degree);
-        let mut point = start.point.clone();
-        if let Some(u) = damped(&mut problem, &point) {
+        let mut problem = problem_of(point, &system, first, curve.free);
+        let mut point = point.clone();
+        // Every step lets the conditions refer to its result.
+        if let Some(u) = damped(&mut problem, &point, CLOSE) {
             point = problem.point(&u, &[], Examination::default());
         }
-        let found = growth::polished(&mut problem, &settings, &point).map_err(|why| {
-            let how = if coarse { "cut at the equilibrium" } else { "after it was lengthened next to the equilibrium" };
-            format!(
-                "Newton's method does not lead from the last cycle, {how}, to a {} orbit: {why}\nlikely cause: the cycle \
-                 is still far from it\nwhat to do: follow the branch of cycles further, with a smaller tolerance or \
-                 more `max-points`",
-                curve.hold
-            )
-        })?;
+        let found = growth::polished(&mut problem, &settings, &point)?;
         problem.set_mesh(&found.mesh);
         let row = parameter_row(found.u.len());
         let error = match problem.factorise(&found.u, &row) {
             Ok(()) => problem.truncation(&found.u),
             Err(_) => f64::NAN,
         };
-        let point = found.point;
-        drop(problem);
-        start.point = point;
-        let sizes = start.field.sizes(&start.point.parameters);
+        Ok((found.point, error))
+    };
+    let (point, mut error) = solved(&start, &start.point).map_err(|why| {
+        format!(
+            "Newton's method does not lead from the orbit cut next to the equilibrium to a {} orbit: {why}\nlikely cause: the \
+             orbit is still far from one\nwhat to do: follow the branch of cycles further, with a smaller tolerance or \
+             more `max-points`, or start near another value of the parameter",
+            curve.hold
+        )
+    })?;
+    start.point = point;
+    let (mut longest, mut failed) = (SHORTEST, None);
+    for _ in 0..LENGTHENINGS {
         let goal = MARGIN * tolerance;
-        let at_limit = sizes.iter().all(|size| *size < LEAST);
+        let sizes = start.field.sizes(&start.point.parameters);
+        let at_limit = sizes.iter().zip(start.extents()).all(|(size, extent)| *size < LEAST * extent);
         if error <= goal || at_limit && error <= ENOUGH * tolerance {
             return Ok(start);
         }
@@ -451,49 +575,28 @@ fn settled<'s>(
                  equilibrium is clearly a saddle, or use a larger tolerance"
             ));
         }
-        // The error is of second order.
-        let share = (0.5 * goal / error).sqrt().clamp(0.05, 0.5);
-        start.point = lengthened(&start, share).ok_or("the equilibrium is not hyperbolic")?;
-        coarse = false;
+        let orbit = start.cycle().ok_or("the orbit is no cycle")?;
+        let share = share_for(goal, error).max(longest);
+        let (orbit, parameters) =
+            start.field.lengthened(orbit, &start.point.parameters, share).ok_or("the equilibrium is not hyperbolic")?;
+        let guess = bare(&parameters, Solution::Cycle(orbit));
+        match solved(&start, &guess) {
+            Ok(found) => (start.point, error) = found,
+            // Less far at once.
+            Err(_) if longest < LONGEST => longest = longest.sqrt(),
+            Err(_) if error <= ENOUGH * tolerance => return Ok(start),
+            Err(why) => {
+                failed = Some(why);
+                break;
+            }
+        }
     }
-    Err("the truncation error does not decrease when the orbit is lengthened".into())
-}
-
-/// The orbit continued by the linear flow until its ends are closer to the equilibria by the factor `share`.
-fn lengthened(start: &Start, share: f64) -> Option<Point> {
-    const PIECES: usize = 6;
-    let (field, point, cycle) = (&start.field, &start.point, start.cycle()?);
-    let (n, parameters) = (field.dim(), &point.parameters);
-    let ends = [cycle.state(0.0), cycle.end()];
-    let ys = field.deviations([&ends[0], &ends[1]], parameters);
-    let splits = [field.split(0, parameters)?, field.split(1, parameters)?];
-    let times = [splits[0].time_to(&ys[0], 1.0, share)?, splits[1].time_to(&ys[1], -1.0, share)?];
-    let length = cycle.period;
-    let outer = |end: usize, t: f64| -> Vec<f64> {
-        let side = if end == 0 { 1.0 } else { -1.0 };
-        let y = splits[end].flow(&ys[end], side, t);
-        let moved = ends[end].iter().zip(&ys[end]).zip(&y).enumerate();
-        moved.map(|(c, ((x, y0), y))| x + field.scale(c) * (y - y0)).collect()
-    };
-    let scheme = cycle.scheme();
-    let piece = |end: usize| -> Vec<f64> {
-        (0..=PIECES).map(|k| times[end] * (k as f64 / PIECES as f64 - if end == 0 { 1.0 } else { 0.0 })).collect()
-    };
-    let [before, after] = [piece(0), piece(1)];
-    let mut profile = sampled(&before, &scheme, &|t| outer(0, t));
-    profile.extend_from_slice(&cycle.profile);
-    profile.extend(sampled(&after, &scheme, &|t| outer(1, t)));
-    let total = times[0] + length + times[1];
-    let all = before
-        .iter()
-        .map(|t| t + times[0])
-        .chain(cycle.mesh[1..].iter().map(|t| times[0] + t * length))
-        .chain(after[1..].iter().map(|t| times[0] + length + t));
-    let mut mesh: Vec<f64> = all.map(|t| t / total).collect();
-    (mesh[0], mesh[profile.len() / (n * (cycle.degree + 1))]) = (0.0, 1.0);
-    let sizes = field.sizes(parameters).map(|size| share * size);
-    let place = &parameters[field.place(0).start..field.place(1).end];
-    let moved = field.parameters(parameters, total, place, sizes, &field.gain(parameters));
-    let solution = Cycle { period: total, mesh: mesh.into(), profile, ..cycle.clone() };
-    Some(bare(&moved, Solution::Cycle(solution)))
+    Err(match failed {
+        Some(why) => format!(
+            "the orbit cannot be lengthened next to the equilibrium until the error of its truncation, {error:.1e}, is below \
+             the tolerance: {why}\nlikely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where \
+             the equilibrium is clearly a saddle, or use a larger tolerance"
+        ),
+        None => "the truncation error does not decrease when the orbit is lengthened".into(),
+    })
 }

@@ -1,6 +1,7 @@
 //! A vector field that counts its evaluations.
 
-use crate::contract::{Batch, VectorField};
+use crate::contract::{Batch, Turning, VectorField};
+use crate::diagram::Cycle;
 use num_complex::Complex64;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -141,6 +142,14 @@ impl VectorField for Counted<'_> {
 
     fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
         self.field.saddles(parameters)
+    }
+
+    fn flips(&self, orbit: &Cycle, parameters: &[f64]) -> [Option<Turning>; 4] {
+        self.field.flips(orbit, parameters)
+    }
+
+    fn lengthened(&self, orbit: &Cycle, parameters: &[f64], share: f64) -> Option<(Cycle, Vec<f64>)> {
+        self.field.lengthened(orbit, parameters, share)
     }
 
     fn linearise_outputs(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) -> bool {

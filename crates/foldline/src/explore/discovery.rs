@@ -203,6 +203,7 @@ impl Discovery<'_, '_> {
             hold: Kind::Fold,
             of: parent.name.clone(),
             near: None,
+            to: None,
             free: second,
             ranges: [plan.range, range],
             until: None,

@@ -4,7 +4,7 @@ use super::counted::Counted;
 use super::plan::Holds;
 use super::repointed;
 use super::symmetry::{is_rotating_wave, rotation};
-use super::{System, corner, impacts as beside_impacts, tori};
+use super::{System, connections, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -17,7 +17,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
-use crate::special::on_connections;
+use crate::special::on_connections::{self, limit::Limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
@@ -368,6 +368,8 @@ pub struct Growth<'g> {
 
 /// Number of corners on one side of a branch, after which something is wrong.
 const CORNERS: usize = 32;
+/// Number of times that a connecting orbit is lengthened on one side of a curve: a bound on the work.
+const LENGTHENINGS: usize = 20;
 /// Points at either end of a branch that always stay whole, since continuation needs them.
 const WHOLE: usize = 3;
 
@@ -635,6 +637,7 @@ impl Growth<'_> {
         let next_points: RefCell<Option<Points>> = RefCell::default();
         let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
+        let (connecting, line) = (branch.is_connecting(), self.line(branch));
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -723,6 +726,42 @@ impl Growth<'_> {
                 false => follow(&mut walk, next, None, position.unsigned_abs() as usize, &mut sink),
             };
         }
+        // A connecting orbit that has come to need longer ends goes on with them.
+        for _ in 0..LENGTHENINGS {
+            let short = connecting
+                && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
+            let there = latest.borrow().clone();
+            let Some(mut next) = Some(there)
+                .filter(|_| short && !self.observer.stopping())
+                .and_then(|there| connections::relengthened(self, &system, &line, &there))
+            else {
+                break;
+            };
+            next.position += if side == 1 { 1 } else { -1 };
+            let mut problem = line.problem(&system, self.degree, &next);
+            let Ok(start) = revived(&mut *problem, self.settings, &next, direction) else { break };
+            let mut walk = Follow {
+                problem: &mut *problem,
+                settings: self.settings,
+                monitors: &monitors,
+                marks: &marks,
+                collapses: &collapses,
+                limit: &|_| None,
+                corner: &|_| None,
+                direction,
+                symmetric,
+                holds: false,
+                free: branch_free,
+                home: home.as_ref(),
+                homecoming: Homecoming::default(),
+                inspected: 0.0,
+            };
+            let position = next.position.unsigned_abs() as usize;
+            ending = match sink(Item::Point(next)) == Verdict::Stop {
+                true => Ending::Stopped,
+                false => follow(&mut walk, start, None, position, &mut sink),
+            };
+        }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
             return Ending::Stopped;
@@ -759,11 +798,24 @@ impl Growth<'_> {
             }
         }
         match ending {
-            Ending::StepTooSmall(why) if branch.is_connecting() => {
-                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why))
-            }
-            Ending::GivenUp(why) if branch.is_connecting() => {
-                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
+            Ending::StepTooSmall(why) | Ending::GivenUp(why) | Ending::MeshTooLarge(why) if branch.is_connecting() => {
+                let points: Vec<&Point> = match side {
+                    1 => branch.points.iter().rev().collect(),
+                    _ => branch.points.iter().collect(),
+                };
+                match Limit::of(&points, branch.free, branch.held.map(|(_, first)| first), self.system.field) {
+                    Some(limit) => {
+                        let special = limit.special(&latest.borrow());
+                        let parameter = special.point.parameters[branch.free];
+                        let at = special.kind;
+                        branch.insert_special(special.clone());
+                        match self.tell(Event::Special(branch, &special)) {
+                            true => Ending::Joined { at, parameter },
+                            false => Ending::Stopped,
+                        }
+                    }
+                    None => Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why)),
+                }
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {
                 Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))

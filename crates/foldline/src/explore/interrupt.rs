@@ -6,8 +6,8 @@
 //! Results computed meanwhile are wrong, so events are dropped from then on, and the run file holds what was accepted
 //! before.
 
-use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
-use crate::diagram::{Branch, Point, Shortfall};
+use crate::contract::{Batch, Event, Observer, Turning, VectorField, Verdict};
+use crate::diagram::{Branch, Cycle, Point, Shortfall};
 use num_complex::Complex64;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -213,6 +213,14 @@ impl VectorField for Interruptible<'_> {
 
     fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {
         self.field.saddles(parameters)
+    }
+
+    fn flips(&self, orbit: &Cycle, parameters: &[f64]) -> [Option<Turning>; 4] {
+        self.field.flips(orbit, parameters)
+    }
+
+    fn lengthened(&self, orbit: &Cycle, parameters: &[f64], share: f64) -> Option<(Cycle, Vec<f64>)> {
+        self.field.lengthened(orbit, parameters, share)
     }
 
     fn linearise_outputs(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) -> bool {

@@ -62,6 +62,7 @@ mod resonances;
 mod responses;
 mod schedule;
 pub mod seeds;
+mod shooting;
 mod sizes;
 pub mod switch;
 mod symmetry;

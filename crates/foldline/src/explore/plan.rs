@@ -159,6 +159,8 @@ pub struct CurvePlan {
     /// The special point is the one of that kind nearest to this value of the branch's parameter; the first one if
     /// `None`.
     pub near: Option<f64>,
+    /// A state near the second equilibrium of a connecting orbit that starts from a branch of equilibria.
+    pub to: Option<Vec<f64>>,
     /// Index of the second parameter; the first is that of the branch.
     pub free: usize,
     /// Smallest and largest value of the branch's parameter, then of the second parameter.

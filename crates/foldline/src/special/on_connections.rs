@@ -11,13 +11,17 @@
 //! | saddle-node homoclinic | the eigenvalue of smallest modulus |
 //! | Shilnikov–Hopf | the smallest real part of a pair |
 //! | orbit flip | ⟨p, x(T) - x_1⟩ of the leading left eigenvector p, at the end; likewise at the start |
+//! | inclination flip | ⟨q, ψ(0)⟩ of the leading right eigenvector q and the adjoint solution ψ; likewise at the end |
 //!
 //! **Source.** champneys1996, §2 (list and test functions); kuznetsov2004, §6.4 (Shilnikov's condition).
 //!
 //! **Departures.** The discriminant in place of the difference of two real eigenvalues: it passes through zero.
 
-use crate::contract::{Monitor, Sight, VectorField};
-use crate::diagram::{Kind, Point};
+pub mod limit;
+
+use crate::contract::{Monitor, Sight, Turning, VectorField};
+use crate::diagram::{Kind, Point, Solution};
+use crate::linalg::dot;
 use num_complex::Complex64;
 
 /// Test function in one line of the table; `side` is 1 for the unstable eigenvalues at the start, -1 for the stable
@@ -33,7 +37,9 @@ pub fn monitors<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
     let both = [Kind::DoubleEigenvalue, Kind::ThreeLeading, Kind::NonCentral, Kind::ShilnikovHopf];
     let own = |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side }) as Box<dyn Monitor + 'a>;
     let sides = both.into_iter().flat_map(|kind| [own(kind, 1.0), own(kind, -1.0)]);
-    std::iter::once(own(Kind::NeutralSaddle, 1.0)).chain(sides).collect()
+    let flips = [Kind::OrbitFlip, Kind::InclinationFlip].into_iter();
+    let flips = flips.flat_map(|kind| [own(kind, -1.0), own(kind, 1.0)]);
+    std::iter::once(own(Kind::NeutralSaddle, 1.0)).chain(sides).chain(flips).collect()
 }
 
 /// Eigenvalues of one side of the imaginary axis by their distance from it, as positive real parts.
@@ -94,6 +100,18 @@ impl OnConnection<'_> {
         Some(of_side(if self.side > 0.0 { &start } else { &end }, self.side))
     }
 
+    /// Test function of a flip.
+    fn turning(&self, at: &Point) -> Option<Turning> {
+        let Solution::Cycle(orbit) = &at.solution else { return None };
+        let later = if self.side > 0.0 { 1 } else { 0 };
+        let first = if self.kind == Kind::OrbitFlip { 0 } else { 2 };
+        self.field.flips(orbit, &at.parameters).into_iter().nth(first + later).flatten()
+    }
+
+    fn is_flip(&self) -> bool {
+        matches!(self.kind, Kind::OrbitFlip | Kind::InclinationFlip)
+    }
+
     fn tested(&self, at: &Point) -> Option<f64> {
         let own = self.own(at)?;
         match self.kind {
@@ -125,16 +143,42 @@ impl Monitor for OnConnection<'_> {
         self.kind
     }
 
-    fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        self.tested(at).unwrap_or(f64::NAN)
+    fn value(&self, reference: &Point, at: &Point) -> f64 {
+        if !self.is_flip() {
+            return self.tested(at).unwrap_or(f64::NAN);
+        }
+        let Some(known) = self.turning(reference) else { return f64::NAN };
+        self.turning(at).map_or(f64::NAN, |own| if dot(&own.refer, &known.refer) < 0.0 { -own.value } else { own.value })
     }
 
     fn confirms(&self, at: &Point) -> bool {
         // Test functions jump where the leading eigenvalues become others.
         const NEAR: f64 = 1e-4;
+        if self.is_flip() {
+            return self.turning(at).is_some();
+        }
         let Some((own, value)) = self.own(at).zip(self.tested(at)) else { return false };
         let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
         value.abs() < NEAR * size * if self.kind == Kind::DoubleEigenvalue { size } else { 1.0 }
+    }
+
+    // Where a test function vanishes along the whole curve, as the saddle quantity of a conservative model does, its signs are
+    // those of rounding errors.
+    fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
+        const ROUNDING: f64 = 1e-9;
+        /// Largest ratio of the test function at its zero to that at the ends: it jumps where another eigenvalue takes the lead.
+        const JUMPS: f64 = 0.01;
+        if self.is_flip() {
+            let size = |at: &Point| self.turning(at).map_or(f64::NAN, |own| own.value.abs());
+            let [left, right] = [size(ends[0]), size(ends[1])];
+            return size(at) < JUMPS * left.max(right) && size(at) < 0.5 * left.min(right);
+        }
+        let clear = |end: &&Point| {
+            let Some((own, value)) = self.own(end).zip(self.tested(end)) else { return true };
+            let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+            value.abs() > ROUNDING * size
+        };
+        self.confirms(at) && ends.iter().any(clear)
     }
 
     fn reads(&self) -> Sight {
@@ -159,6 +203,9 @@ impl Monitor for OnConnection<'_> {
             (Kind::NeutralSaddle, _) => "neutral saddle-focus (Belyakov)".into(),
             (Kind::DoubleEigenvalue, _) => format!("of the {side} eigenvalues: from saddle to saddle-focus (Belyakov)"),
             (Kind::ThreeLeading, _) => format!("of the {side} eigenvalues"),
+            (Kind::OrbitFlip, _) if self.side > 0.0 => "leaves along the strong unstable manifold".into(),
+            (Kind::OrbitFlip, _) => "returns along the strong stable manifold".into(),
+            (Kind::InclinationFlip, _) => format!("of the {side} manifold"),
             _ => String::new(),
         }
     }

@@ -12,12 +12,12 @@
 //!   (2)  f(x_i, p) = 0
 //!   (3)  Q_0 P_s(A_0) (x(0) - x_0) = 0             n_s rows
 //!   (4)  Q_1 P_u(A_1) (x(1) - x_1 - g) = 0         n_u rows
-//!   (5)  ⟨e_0, x(0) - x_0⟩ = 1,   ⟨e_1, x(1) - x_1 - g⟩ = 1
+//!   (5)  ⟨e_0, x(0) - x_0⟩ = ε_0,   ⟨e_1, x(1) - x_1 - g⟩ = ε_1
 //! ```
 //!
 //! Rows Q_i span those of the projectors at a reference solution. With its deviations y_i from the equilibria, and H of
-//! `splitting`, e_i = H y_i / (ε_i |y_i|): the orbit is cut off at the distance ε_i, where it crosses the plane (5)
-//! transversally. (5) fixes both T and the phase. The orbit exists if n_u(x_0) + n_s(x_1) = n, for isolated values of
+//! `splitting`, e_0 = P_uᵀ H y_0 / ε_0, e_1 = P_sᵀ H y_1 / ε_1, ε_i = |y_i|: the orbit is cut off where it crosses the plane (5) transversally, at the
+//! distance ε_i. (5) fixes both T and the phase. The orbit exists if n_u(x_0) + n_s(x_1) = n, for isolated values of
 //! one parameter.
 //!
 //! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
@@ -33,16 +33,23 @@
 //!
 //! **Fails when** an eigenvalue of an equilibrium reaches the imaginary axis.
 
+mod flips;
+pub mod longer;
 mod splitting;
 #[cfg(test)]
 mod tests;
 
-use crate::contract::{Batch, Parameters, VectorField};
+use crate::contract::{Batch, Parameters, Turning, VectorField};
+use crate::diagram::Cycle;
 use crate::linalg::{dot, max_abs};
 use crate::stability::eigenvalues;
 use num_complex::Complex64;
-use splitting::{flow, identity, metric, product, row_basis, sign, times};
+use splitting::{flow, identity, metric, product, row_basis, sign, times, transposed};
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
+
+/// Number of orbits whose flips are kept: those at both ends of a step, and between.
+const KEPT: usize = 4;
 
 /// A field on the states of a connecting orbit; see the module.
 pub struct ConnectingField<'a> {
@@ -54,6 +61,8 @@ pub struct ConnectingField<'a> {
     /// Dimension of the unstable subspace at the start.
     unstable: usize,
     determined: Vec<usize>,
+    /// The last results of [`VectorField::flips`], with the parameters, which tell one orbit from another.
+    turned_last: Mutex<Vec<(Vec<f64>, [Option<Turning>; 4])>>,
 }
 
 /// An equilibrium, in units of the sizes of the states.
@@ -90,6 +99,26 @@ impl Split {
     pub fn length(&self, y: &[f64], side: f64) -> f64 {
         let part = times(&self.projector(side), y);
         dot(&times(&self.h, &part), &part).max(0.0).sqrt()
+    }
+
+    /// Length of `y` `[n]`, in units of the sizes of the states.
+    pub fn size(&self, y: &[f64]) -> f64 {
+        dot(&self.covector_of(y), y).max(0.0).sqrt()
+    }
+
+    /// H y.
+    pub fn covector_of(&self, y: &[f64]) -> Vec<f64> {
+        times(&self.h, y)
+    }
+
+    /// Unit eigenvector of the only stable or unstable eigenvalue.
+    pub fn direction(&self, side: f64) -> Vec<f64> {
+        row_basis(&transposed(&self.projector(side), self.n), 1, self.n)
+    }
+
+    /// Unit left eigenvector of the only stable or unstable eigenvalue.
+    pub fn covector(&self, side: f64) -> Vec<f64> {
+        row_basis(&self.projector(side), 1, self.n)
     }
 
     /// The part of `y` `[n]` in the stable or the unstable subspace.
@@ -136,7 +165,7 @@ impl<'a> ConnectingField<'a> {
     pub fn new(field: &'a dyn VectorField, scales: &[f64], places: usize, unstable: usize) -> ConnectingField<'a> {
         let (n, k) = (field.dim(), field.parameter_count());
         let determined = (k..k + 1 + places * n).collect();
-        ConnectingField { field, scales: scales.to_vec(), places, unstable, determined }
+        ConnectingField { field, scales: scales.to_vec(), places, unstable, determined, turned_last: Mutex::default() }
     }
 
     /// The field of a stored orbit with these parameters; `None` if its equilibrium is not hyperbolic.
@@ -182,6 +211,16 @@ impl<'a> ConnectingField<'a> {
     /// Size of a state.
     pub fn scale(&self, state: usize) -> f64 {
         self.scales[state]
+    }
+
+    /// |f(x_i + y) - A_i y| / |A_i y| for a deviation `y` `[n]` from the equilibrium of an end.
+    pub fn nonlinearity(&self, end: usize, y: &[f64], parameters: &[f64]) -> f64 {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let there: Vec<f64> = (0..self.dim()).map(|c| at.state[c] + y[c] * self.scales[c]).collect();
+        let linear = times(&at.a, y);
+        let beyond = self.saddle(&there, parameters, &[]).f;
+        let rest: Vec<f64> = beyond.iter().zip(&at.f).zip(&linear).map(|((b, f), l)| b - f - l).collect();
+        max_abs(&rest) / max_abs(&linear)
     }
 
     /// Turns g of angles.
@@ -450,24 +489,28 @@ impl VectorField for ConnectingField<'_> {
                 put(values, &place, 0.0, &varied);
             }
             // (5)
-            put(&parameters[self.plane(end)], &place, 1.0, &[]);
+            put(&parameters[self.plane(end)], &place, self.sizes(parameters)[end], &[]);
         }
     }
 
     fn refer(&self, ends: [&[f64]; 2], parameters: &mut [f64]) {
         let ys = self.deviations(ends, parameters);
-        let (n, ranges, sizes) = (self.dim(), self.row_ranges(), self.sizes(parameters));
+        let (n, ranges) = (self.dim(), self.row_ranges());
         for (end, y) in ys.iter().enumerate() {
             let Some(split) = self.split(end, parameters) else { return };
             let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
-            let part = times(&split.projector(kept), y);
-            let along = times(&split.h, &part);
-            let length = dot(&along, &part).max(0.0).sqrt();
-            if !(length > 0.0 && max_abs(&along).is_finite()) {
+            // Blind to the other subspace, so that what the conditions neglect does not shift the phase.
+            let own = split.covector_of(&split.part(y, kept));
+            let along = times(&transposed(&split.projector(kept), n), &own);
+            let (length, reached) = (split.length(y, kept), dot(&along, y));
+            if !(length > 0.0 && reached > 0.0 && max_abs(&along).is_finite()) {
                 return;
             }
+            // The plane passes through the point itself, so that a new reference does not move the solution.
             let plane = self.plane(end);
-            parameters[plane].iter_mut().zip(&along).for_each(|(e, h)| *e = h / (sizes[end] * length));
+            parameters[plane].iter_mut().zip(&along).for_each(|(e, h)| *e = h * length / reached);
+            let hidden = self.hidden();
+            parameters[hidden + end] = length;
             let rows = ranges[end].len() / n;
             parameters[ranges[end].clone()].copy_from_slice(&row_basis(&split.projector(gone), rows, n));
         }
@@ -496,6 +539,22 @@ impl VectorField for ConnectingField<'_> {
             all.push(0.0);
         }
         all
+    }
+
+    fn flips(&self, orbit: &Cycle, parameters: &[f64]) -> [Option<Turning>; 4] {
+        let known = || self.turned_last.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = known().iter().find(|(at, _)| at == parameters) {
+            return found.clone();
+        }
+        let found = self.turnings(orbit, parameters);
+        let mut kept = known();
+        kept.insert(0, (parameters.to_vec(), found.clone()));
+        kept.truncate(KEPT);
+        found
+    }
+
+    fn lengthened(&self, orbit: &Cycle, parameters: &[f64], share: f64) -> Option<(Cycle, Vec<f64>)> {
+        longer::longer(self, orbit, parameters, share)
     }
 
     fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {

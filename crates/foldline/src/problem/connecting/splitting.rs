@@ -114,6 +114,11 @@ pub(super) fn product(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
     out
 }
 
+/// Transpose of a matrix `[n × n]`.
+pub(super) fn transposed(a: &[f64], n: usize) -> Vec<f64> {
+    (0..n * n).map(|k| a[k % n * n + k / n]).collect()
+}
+
 /// A matrix `[rows × n]` times a vector.
 pub(super) fn times(a: &[f64], x: &[f64]) -> Vec<f64> {
     a.chunks_exact(x.len()).map(|row| dot(row, x)).collect()

@@ -90,6 +90,8 @@ pub struct CycleProblem<'a> {
     halves: bool,
     /// Numbers of conditions on the ends and on integrals, for a boundary-value problem.
     conditions: [usize; 2],
+    /// True if the stated error contains what the conditions at the ends neglect.
+    truncation_stated: bool,
     /// q of (4); 0 for an autonomous field.
     forcing_periods: u32,
     /// `[n]`: x_N - x_0 where angles rotate; see [`Cycle::gain`].
@@ -150,6 +152,7 @@ impl<'a> CycleProblem<'a> {
         let mut problem = CycleProblem {
             system: System::new(n, &scheme.end, 1 + setting.freedom() + unused),
             conditions,
+            truncation_stated: true,
             local: None,
             structured: true,
             length: 0,
@@ -197,6 +200,13 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
+    /// This problem without the error of the conditions at the ends in its stated error, for orbits that are still being
+    /// lengthened.
+    pub fn without_truncation(mut self) -> CycleProblem<'a> {
+        self.truncation_stated = false;
+        self
+    }
+
     /// This problem with another setting of as many states, conditions and free parameters.
     pub(in crate::problem) fn rehoused<'b>(self, setting: Setting<'b>) -> CycleProblem<'b> {
         let CycleProblem {
@@ -207,6 +217,7 @@ impl<'a> CycleProblem<'a> {
             n,
             halves,
             conditions,
+            truncation_stated,
             forcing_periods,
             gain,
             times,
@@ -243,6 +254,7 @@ impl<'a> CycleProblem<'a> {
             n,
             halves,
             conditions,
+            truncation_stated,
             forcing_periods,
             gain,
             times,
@@ -786,7 +798,7 @@ impl ZeroProblem for CycleProblem<'_> {
             let half = 0.5 * self.setting.field.periods().get(c).copied().unwrap_or(*gain).abs();
             (found.ranges[c], found.averages[c]) = ([-half, half], [f64::NAN; 2]);
         }
-        let truncated = self.truncation(u);
+        let truncated = if self.truncation_stated { self.truncation(u) } else { 0.0 };
         found.trust.discretisation = truncated + SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
         found.trust.residual = residual;
         found.trust.slope = self.slope_error();
