@@ -11,7 +11,7 @@
 //! | 1. which coordinates and forces are not linear; flexibility at them | `local` |
 //! | 2. starts: two lines that nearly satisfy the balance | `lines` |
 //! | 3. Newton's method on the balance, more harmonics, the whole state | `balance` |
-//! | 4. collocation on the full model; the choice among what was found | this one |
+//! | 4. collocation on the full model, until a stable cycle is found | this one |
 //!
 //! **Source.** Balance of harmonics at the nonlinear coordinates alone: krack2019, §4. The starts are ours.
 //!
@@ -96,7 +96,11 @@ pub(super) fn bounces(
         let Solution::Cycle(cycle) = &point.solution else { continue };
         let known = |other: &Point| point.difference(other, system.measure(), &system.reflections[0]) < 30.0 * tolerance;
         if spectral_ratio(cycle, whirl) == Some((p, q)) && !cycles.iter().any(known) {
+            let stable = point.unstable == 0;
             cycles.push(point);
+            if stable {
+                break;
+            }
         }
     }
     cycles.sort_by_key(|cycle| cycle.unstable);
