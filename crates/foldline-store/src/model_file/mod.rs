@@ -53,6 +53,7 @@ const ROOT_KEYS: [&str; 31] = [
     "bearing",
     "point-mass",
     "unbalance",
+    "film",
     "contact",
     "force",
 ];

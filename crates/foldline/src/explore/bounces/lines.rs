@@ -6,9 +6,11 @@
 //!
 //! **Equations.** With the lines e_k at the orders k = p, q and the harmonics g_k of the forces on them,
 //!
-//!   (1)  misfit = min_w max_k |e_k - H(ikw) g_k| / |e_k|
+//!   (1)  misfit = min_w max_k |e_k - σ H(ikw) g_k| / |e_k|
 //!
-//! Each pair of amplitudes and directions contributes the phase with the smallest misfit, if it is below [`GOOD`].
+//! The local forces are also taken at shares σ of their size ([`SHARES`]), from which they then grow to the whole: the softer a
+//! ring, the closer the motion is to two lines, and the more starts converge. For each share a pair of amplitudes and
+//! directions contributes the phase with the smallest misfit, if it is below [`GOOD`].
 //!
 //! **Fails when** the motion is carried by harmonics of the two lines rather than by themselves.
 
@@ -19,8 +21,10 @@ use std::f64::consts::TAU;
 
 /// Largest misfit of a start.
 const GOOD: f64 = 1.0;
-/// Number of starts that are corrected, those with the smallest misfit.
-const STARTS: usize = 48;
+/// Shares of the local forces with which starts are sought, softest first: a ring 25 times as stiff as the shaft needs a tenth.
+const SHARES: [f64; 4] = [0.03, 0.1, 0.3, 1.0];
+/// Number of starts for each share, those with the smallest misfit.
+const STARTS: usize = 16;
 /// Nodes over a period.
 const NODES: usize = 64;
 const PHASES: usize = 12;
@@ -53,15 +57,22 @@ pub(super) fn starts(local: &Local, orders: [usize; 2]) -> Vec<Balance> {
     let ends = [0.2 * rate(*first) / orders[1] as f64, 1.5 * rate(*last) / orders[0] as f64];
     let table = Table::new(local, orders, ends);
     let directions = directions(local, &light);
-    let mut rated: Vec<(f64, Start)> = Vec::new();
+    let mut rated: [Vec<(f64, Start)>; SHARES.len()] = Default::default();
     let pairs = directions.iter().flat_map(|a| directions.iter().map(move |b| [a, b]));
     for (pair, (i, j)) in pairs.flat_map(|pair| sizes().map(move |sizes| (pair, sizes))) {
-        rated.extend(table.best(local, pair, [i, j].map(|power| 0.5f64.powf(-0.5 * f64::from(power)))));
+        let found = table.best(local, pair, [i, j].map(|power| 0.5f64.powf(-0.5 * f64::from(power))));
+        rated.iter_mut().zip(found).for_each(|(list, own)| list.extend(own));
     }
-    rated.sort_by(|a, b| a.0.total_cmp(&b.0));
-    rated.truncate(STARTS);
     let harmonics = LEAST.max(HARMONICS * orders[1]);
-    rated.into_iter().map(|(_, start)| Balance::of_lines(local, harmonics, orders, &start.lines, start.w)).collect()
+    let start = |(share, start): (&f64, Start)| {
+        Balance::of_lines(local, harmonics, orders, &start.lines, start.w).with_share(*share)
+    };
+    let sorted = rated.into_iter().zip(&SHARES).flat_map(|(mut list, share)| {
+        list.sort_by(|a, b| a.0.total_cmp(&b.0));
+        list.truncate(STARTS);
+        list.into_iter().map(move |(_, own)| (share, own))
+    });
+    sorted.map(start).collect()
 }
 
 fn sizes() -> impl Iterator<Item = (i32, i32)> {
@@ -117,13 +128,13 @@ impl Table {
         Table { orders, h: orders.map(of), w }
     }
 
-    /// The best phase and frequency for two directions and their amplitudes.
+    /// The best phase and frequency for two directions and their amplitudes, for each share.
     fn best(
         &self,
         local: &Local,
         directions: [&Vec<Complex64>; 2],
         amplitudes: [f64; 2],
-    ) -> Option<(f64, Start)> {
+    ) -> [Option<(f64, Start)>; SHARES.len()] {
         let (s, r, lanes) = (local.coordinates(), local.forces(), NODES * PHASES);
         let lines = |phase: usize| -> [Vec<Complex64>; 2] {
             let turns = [Complex64::new(amplitudes[0], 0.0), Complex64::from_polar(amplitudes[1], TAU * phase as f64 / PHASES as f64)];
@@ -141,7 +152,7 @@ impl Table {
             }
         }
         let g = local.force(&e, lanes);
-        let mut best: Option<(f64, usize, usize)> = None;
+        let mut best: [Option<(f64, usize, usize)>; SHARES.len()] = Default::default();
         for phase in 0..PHASES {
             let lines = lines(phase);
             let own = |f: usize| &g[f * lanes + phase * NODES..][..NODES];
@@ -154,26 +165,34 @@ impl Table {
             if !forces.iter().flatten().all(|g| g.is_finite()) || forces.iter().flatten().all(|g| g.norm() == 0.0) {
                 continue;
             }
-            for (at, _) in self.w.iter().enumerate() {
-                let misfit = (0..2).map(|l| self.misfit(local, l, at, &lines[l], &forces)).fold(0.0, f64::max);
-                if misfit < best.map_or(GOOD, |own| own.0) {
-                    best = Some((misfit, phase, at));
+            for at in 0..self.w.len() {
+                let answers = [0, 1].map(|l| self.answer(local, l, at, &forces));
+                for (best, share) in best.iter_mut().zip(SHARES) {
+                    let off = |l: usize| misfit(local, &lines[l], &answers[l], share);
+                    let own = off(0).max(off(1));
+                    if own < best.map_or(GOOD, |known| known.0) {
+                        *best = Some((own, phase, at));
+                    }
                 }
             }
         }
-        best.map(|(misfit, phase, at)| (misfit, Start { lines: lines(phase), w: self.w[at] }))
+        best.map(|own| own.map(|(misfit, phase, at)| (misfit, Start { lines: lines(phase), w: self.w[at] })))
     }
 
-    /// Relative misfit of a line, in units of the sizes.
-    fn misfit(&self, local: &Local, l: usize, at: usize, line: &[Complex64], forces: &[[Complex64; 2]]) -> f64 {
+    /// H g at one of the orders.
+    fn answer(&self, local: &Local, l: usize, at: usize, forces: &[[Complex64; 2]]) -> Vec<Complex64> {
         let (h, r) = (&self.h[l][at], forces.len());
-        let (mut off, mut size) = (0.0, 0.0);
-        for (c, own) in line.iter().enumerate() {
-            let answer: Complex64 = (0..r).map(|f| h[c * r + f] * forces[f][l]).sum();
-            let unit = local.size(c);
-            off += (own - answer).norm_sqr() / (unit * unit);
-            size += own.norm_sqr() / (unit * unit);
-        }
-        (off / size).sqrt()
+        (0..local.coordinates()).map(|c| (0..r).map(|f| h[c * r + f] * forces[f][l]).sum()).collect()
     }
+}
+
+/// Relative misfit of a line, in units of the sizes.
+fn misfit(local: &Local, line: &[Complex64], answer: &[Complex64], share: f64) -> f64 {
+    let (mut off, mut size) = (0.0, 0.0);
+    for (c, (own, answer)) in line.iter().zip(answer).enumerate() {
+        let unit = local.size(c);
+        off += (own - share * answer).norm_sqr() / (unit * unit);
+        size += own.norm_sqr() / (unit * unit);
+    }
+    (off / size).sqrt()
 }

@@ -3,14 +3,14 @@
 //! **Idea.** A rotor that bounces in a ring moves in two whirls whose frequencies the contact pulls into a ratio of whole
 //! numbers. The rest of the rotor, however large, is linear: it only answers with a flexibility at each frequency. So the
 //! few coordinates of the contact are the only unknowns. Two lines with amplitudes and a phase from a grid, and the frequency that
-//! suits them best, are corrected by Newton's method on a few harmonics, then on more, and the cycle of the whole
-//! model that belongs to them is the start for collocation. No transient is computed, and unstable cycles are found like stable ones.
+//! suits them best, are corrected by Newton's method on a few harmonics, with soft contact that is then stiffened, then on
+//! more harmonics. The cycle of the whole model that belongs to them is the start for collocation. No transient is computed, and unstable cycles are found like stable ones.
 //!
 //! | step | file |
 //! |---|---|
 //! | 1. which coordinates and forces are not linear; flexibility at them | `local` |
-//! | 2. starts: two lines that nearly satisfy the balance | `lines` |
-//! | 3. Newton's method on the balance, more harmonics, the whole state | `balance` |
+//! | 2. starts: two lines that nearly satisfy the balance with soft contact | `lines` |
+//! | 3. Newton's method on the balance, the whole force, more harmonics, the whole state | `balance` |
 //! | 4. collocation on the full model, until a stable cycle is found | this one |
 //!
 //! **Source.** Balance of harmonics at the nonlinear coordinates alone: krack2019, §4. The starts are ours.
@@ -34,7 +34,7 @@ use balance::Balance;
 use local::Local;
 
 /// Number of solutions that collocation corrects.
-const CORRECTED: usize = 4;
+const CORRECTED: usize = 6;
 
 /// Cycles found, and what was tried.
 pub(super) struct Bounces {
@@ -75,13 +75,18 @@ pub(super) fn bounces(
     let local = Local::of(system, parameters, x0)?;
     let (starts, mut tally) = (lines::starts(&local, [q as usize, p as usize]), Tally::default());
     (tally.starts, tally.coordinates) = (starts.len(), local.coordinates());
-    let mut found: Vec<Balance> = Vec::new();
+    let (mut soft, mut found): (Vec<Balance>, Vec<Balance>) = Default::default();
     for start in starts {
         if system.field.ended() {
             break;
         }
         let Some(own) = start.solved(&local) else { continue };
         tally.solved += 1;
+        if own.divisor() != 1 || soft.iter().any(|other| other.same(&own)) {
+            continue;
+        }
+        soft.push(own.clone());
+        let Some(own) = own.grown(&local) else { continue };
         if own.divisor() == 1 && !found.iter().any(|other| other.same(&own)) {
             found.push(own);
         }

