@@ -1,7 +1,7 @@
 //! Bouncing motions of a rotor of 28 degrees of freedom, and its responses under gravity, against an independent harmonic balance.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Cycle, Diagram, Point};
+use foldline::diagram::{Cycle, Diagram, Kind, Point};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 use std::collections::HashMap;
@@ -38,7 +38,8 @@ fn reference(table: &'static str) -> HashMap<&'static str, f64> {
     let rows = table.lines().filter(|line| !line.starts_with('#')).skip(1);
     let value = |row: &'static str| {
         // Commas occur inside quotation marks.
-        let parts: Vec<&str> = row.split('"').enumerate().filter(|(k, _)| k % 2 == 0).flat_map(|(_, part)| part.split(',')).collect();
+        let parts: Vec<&str> =
+            row.split('"').enumerate().filter(|(k, _)| k % 2 == 0).flat_map(|(_, part)| part.split(',')).collect();
         let number = parts.iter().skip(1).find_map(|cell| cell.parse::<f64>().ok());
         (row.split(',').next().unwrap(), number.unwrap())
     };
@@ -89,10 +90,85 @@ fn responses_under_gravity_have_the_harmonics_of_the_reference() {
             let (re, im) = parts.fold((0.0, 0.0), |(re, im), (a, x)| (re + x * a.cos(), im + x * a.sin()));
             if k == 0.0 { re / 4096.0 } else { re.hypot(im) / 2048.0 }
         };
-        for (what, at, k) in [("mean y", 50, 0.0), ("|x| at 1x", 48, 1.0), ("|y| at 1x", 50, 1.0), ("|x| at 2x", 48, 2.0)] {
+        for (what, at, k) in
+            [("mean y", 50, 0.0), ("|x| at 1x", 48, 1.0), ("|y| at 1x", 50, 1.0), ("|x| at 2x", 48, 2.0)]
+        {
             let expected = 1e-3 * known[format!("GR-{name}-{speed}-{what}").as_str()];
             let found = harmonic(at, k);
             assert!((found / expected - 1.0).abs() < 1e-5, "{name} {speed} {what}: {found} instead of {expected}");
         }
+    }
+}
+
+const FILM: &str = r#"
+name = "disc on a squeeze-film damper"
+description = "Disc of 25 kg on a flexible shaft, whose journal of 2 kg is centred in a film by a retainer spring."
+source = "short bearing"
+
+[parameters]
+Omega = { value = "3000 rpm", description = "speed of the shaft" }
+U = { value = 0.5, description = "eccentricity of the disc over the clearance" }
+
+[rotor]
+speed = "Omega"
+
+[rotor.matrices]
+positions = [0.0, 0.5]
+M = [[25, 0, 0, 0, 0, 0, 0, 0], [0, 25, 0, 0, 0, 0, 0, 0], [0, 0, 1, 0, 0, 0, 0, 0], [0, 0, 0, 1, 0, 0, 0, 0],
+     [0, 0, 0, 0, 2, 0, 0, 0], [0, 0, 0, 0, 0, 2, 0, 0], [0, 0, 0, 0, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0, 0, 1]]
+K = [[1e7, 0, 0, 0, -1e7, 0, 0, 0], [0, 1e7, 0, 0, 0, -1e7, 0, 0], [0, 0, 1e4, 0, 0, 0, 0, 0], [0, 0, 0, 1e4, 0, 0, 0, 0],
+     [-1e7, 0, 0, 0, 1.2e7, 0, 0, 0], [0, -1e7, 0, 0, 0, 1.2e7, 0, 0], [0, 0, 0, 0, 0, 0, 1e4, 0], [0, 0, 0, 0, 0, 0, 0, 1e4]]
+C = [[100, 0, 0, 0, 0, 0, 0, 0], [0, 100, 0, 0, 0, 0, 0, 0], [0, 0, 10, 0, 0, 0, 0, 0], [0, 0, 0, 10, 0, 0, 0, 0],
+     [0, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0, 10, 0], [0, 0, 0, 0, 0, 0, 0, 10]]
+
+[[unbalance]]
+node = 0
+amount = "25*0.1e-3*U"
+
+[[film]]
+node = 1
+clearance = "0.1 mm"
+radius = "50 mm"
+length = "20 mm"
+viscosity = "0.02 Pa s"
+"#;
+
+#[test]
+fn a_squeeze_film_makes_the_response_jump() {
+    let known = reference(include_str!("reference/fe_squeeze_film.csv"));
+    let text = "model = \"m\"\ntolerance = 1e-8\n[[seed]]\nname = \"slow\"\nstate = \"zero\"\nparameters = { Omega = \"500 rpm\" }\n\
+                [[branch]]\nname = \"response\"\nfrom = \"slow\"\nfree = \"Omega\"\nrange = [\"500 rpm\", \"9000 rpm\"]\n\
+                mark = { Omega = [\"3000 rpm\", \"5800 rpm\", \"8000 rpm\"] }\n";
+    let study = parse_study(text, "study", FILM, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    let diagram =
+        explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
+    let branch = diagram.branch("response").unwrap();
+    let output = study.model.outputs.iter().position(|own| own.name == "eccentricity_film").unwrap();
+    let seen = |kind: Kind| -> Vec<(f64, f64, usize)> {
+        let own = branch.special.iter().filter(|s| s.kind == kind);
+        let mut list: Vec<(f64, f64, usize)> = own
+            .map(|s| {
+                (
+                    s.point.parameters[branch.free],
+                    s.point.ranges[study.model.states.len() + output][1],
+                    s.unstable_before,
+                )
+            })
+            .collect();
+        list.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        list
+    };
+    let folds = seen(Kind::Fold);
+    assert_eq!(folds.len(), 2, "{folds:?}");
+    for (found, name) in folds.iter().zip(["lower", "upper"]) {
+        near(found.0 / known[format!("SFD U=.5-{name}").as_str()], 1.0, 1e-6);
+        near(found.1 / known[format!("SFD U=.5-{name}e").as_str()], 1.0, 1e-4);
+    }
+    let marks = seen(Kind::Mark);
+    let names = ["3000-1", "5800-1", "5800-2", "5800-3", "8000-1"];
+    assert_eq!(marks.len(), names.len(), "{marks:?}");
+    for (found, name) in marks.iter().zip(names) {
+        near(found.1 / known[format!("SFD U=.5-{name}").as_str()], 1.0, 1e-7);
+        assert_eq!(found.2 > 0, name == "5800-2", "{found:?}");
     }
 }

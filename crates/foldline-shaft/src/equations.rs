@@ -367,7 +367,8 @@ impl Assembled {
             add(format!("penetration_{}", own.name), text, "m", format!("penetration into the ring `{}`", own.name));
         }
         for own in &self.rotor.films {
-            let what = format!("distance of the journal from the centre of the film `{}`, over its clearance", own.name);
+            let what =
+                format!("distance of the journal from the centre of the film `{}`, over its clearance", own.name);
             add(format!("eccentricity_{}", own.name), format!("rotor_{}_eps", own.name), "1", what);
         }
         if let Some(power) = self.power(names) {

@@ -43,10 +43,7 @@ pub(crate) fn definitions(
         (b.clone(), format!("({y}*{vx} - {x}*{vy})/({s}*{c})")),
         (d.clone(), format!("1 - ({x}^2 + {y}^2)/{c}^2")),
         (angle.clone(), if half { format!("pi/2 + atan({a}/sqrt({d}))") } else { "pi".into() }),
-        (
-            first.clone(),
-            format!("{amount}*({angle}*(1 + 2*{a}^2 - {b}^2)/{d}^2.5{})", with(format!(" + 3*{a}/{d}^2"))),
-        ),
+        (first.clone(), format!("{amount}*({angle}*(1 + 2*{a}^2 - {b}^2)/{d}^2.5{})", with(format!(" + 3*{a}/{d}^2")))),
         (
             second.clone(),
             format!(

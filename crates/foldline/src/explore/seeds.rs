@@ -236,7 +236,9 @@ fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
 /// The ratio of a seed whose first solution is sought by the balance of harmonics instead of sampling.
 fn balanced(system: &System, seed: &SeedPlan) -> Option<(u32, u32)> {
     match seed.source {
-        SeedSource::Attractor(AttractorKey::Ratio(p, q)) if instead_of_samples(system, &seed.parameters) => Some((p, q)),
+        SeedSource::Attractor(AttractorKey::Ratio(p, q)) if instead_of_samples(system, &seed.parameters) => {
+            Some((p, q))
+        }
         _ => None,
     }
 }

@@ -190,8 +190,7 @@ impl Balance {
         let e = self.samples(nodes);
         let force: Vec<Vec<Complex64>> =
             local.force(&e, nodes).chunks_exact(nodes).map(|x| harmonics(x, k_max)).collect();
-        let force: Vec<Vec<Complex64>> =
-            force.iter().map(|own| own.iter().map(|g| self.share * g).collect()).collect();
+        let force: Vec<Vec<Complex64>> = force.iter().map(|own| own.iter().map(|g| self.share * g).collect()).collect();
         // C_m, m = -2K … 2K, for each coordinate and force.
         let slopes: Vec<Vec<Complex64>> = local
             .slopes(&e, nodes)
@@ -205,8 +204,7 @@ impl Balance {
             for c in 0..s {
                 let own = &h[c * r..(c + 1) * r];
                 let answer: Complex64 = (0..r).map(|f| own[f][0] * force[f][k]).sum();
-                let slope: Complex64 =
-                    (0..r).map(|f| own[f][1] * Complex64::i() * k as f64 * force[f][k]).sum();
+                let slope: Complex64 = (0..r).map(|f| own[f][1] * Complex64::i() * k as f64 * force[f][k]).sum();
                 let off = self.e[c * (k_max + 1) + k] - answer;
                 let mut put = |column: usize, value: Complex64| {
                     matrix[place(c, k) * size + column] += value.re / self.sizes[c];

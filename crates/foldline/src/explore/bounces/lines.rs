@@ -90,8 +90,7 @@ fn directions(local: &Local, light: &[usize]) -> Vec<Vec<Complex64>> {
     const ALIKE: f64 = 0.95;
     let mut out: Vec<Vec<Complex64>> = Vec::new();
     for mode in light {
-        let shape: Vec<Complex64> =
-            local.shape(*mode).iter().enumerate().map(|(c, z)| z / local.size(c)).collect();
+        let shape: Vec<Complex64> = local.shape(*mode).iter().enumerate().map(|(c, z)| z / local.size(c)).collect();
         let most = shape.iter().map(|z| z.norm()).fold(0.0, f64::max);
         let own: Vec<Complex64> = shape.iter().map(|z| z / most).collect();
         let product = |a: &[Complex64], b: &[Complex64]| a.iter().zip(b).map(|(a, b)| a.conj() * b).sum::<Complex64>();
@@ -137,15 +136,17 @@ impl Table {
     ) -> [Option<(f64, Start)>; SHARES.len()] {
         let (s, r, lanes) = (local.coordinates(), local.forces(), NODES * PHASES);
         let lines = |phase: usize| -> [Vec<Complex64>; 2] {
-            let turns = [Complex64::new(amplitudes[0], 0.0), Complex64::from_polar(amplitudes[1], TAU * phase as f64 / PHASES as f64)];
+            let turns = [
+                Complex64::new(amplitudes[0], 0.0),
+                Complex64::from_polar(amplitudes[1], TAU * phase as f64 / PHASES as f64),
+            ];
             std::array::from_fn(|l| directions[l].iter().map(|z| z * turns[l]).collect())
         };
         let mut e = vec![0.0; s * lanes];
         for phase in 0..PHASES {
             let lines = lines(phase);
             for node in 0..NODES {
-                let carriers =
-                    self.orders.map(|k| Complex64::cis(TAU * (k * node) as f64 / NODES as f64));
+                let carriers = self.orders.map(|k| Complex64::cis(TAU * (k * node) as f64 / NODES as f64));
                 for c in 0..s {
                     e[c * lanes + phase * NODES + node] = (lines[0][c] * carriers[0] + lines[1][c] * carriers[1]).re;
                 }

@@ -241,4 +241,3 @@ fn around(x0: &[f64], sizes: &[f64], batch: usize) -> Vec<f64> {
     }
     out
 }
-

@@ -99,7 +99,8 @@ pub(super) fn bounces(
     for motion in motions.iter().take(CORRECTED) {
         let Some(point) = polish(system, parameters, tolerance, motion) else { continue };
         let Solution::Cycle(cycle) = &point.solution else { continue };
-        let known = |other: &Point| point.difference(other, system.measure(), &system.reflections[0]) < 30.0 * tolerance;
+        let known =
+            |other: &Point| point.difference(other, system.measure(), &system.reflections[0]) < 30.0 * tolerance;
         if spectral_ratio(cycle, whirl) == Some((p, q)) && !cycles.iter().any(known) {
             let stable = point.unstable == 0;
             cycles.push(point);
@@ -159,7 +160,9 @@ fn has_ratio(motion: &Candidate, system: &System, whirl: [usize; 2], ratio: (u32
 /// The equilibrium that Newton's method finds from the state nearest to the origin.
 fn rest(system: &System, parameters: &[f64]) -> Result<Vec<f64>, String> {
     if system.field.forced() || system.field.event_count() > 0 || system.is_open() {
-        return Err("cycles of a ratio are sought by balance of harmonics in autonomous models without events only".into());
+        return Err(
+            "cycles of a ratio are sought by balance of harmonics in autonomous models without events only".into()
+        );
     }
     let settings = settings(system, 1e-9, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let origin = super::diagnosis::next_to_origin(system);

@@ -20,10 +20,7 @@ fn rotor() -> Model {
         name: "rotor".into(),
         parameters: names.iter().zip(PARAMETERS).map(|(name, value)| Parameter::new(name, value)).collect(),
         states: ["u", "v", "du", "dv"].map(State::new).into(),
-        definitions: vec![
-            own("r", "hypot(u, v)"),
-            own("stiffness", "1 - Omega^2 + if(r > 1, ring*(1 - 1/r), 0)"),
-        ],
+        definitions: vec![own("r", "hypot(u, v)"), own("stiffness", "1 - Omega^2 + if(r > 1, ring*(1 - 1/r), 0)")],
         equations: vec![
             own("u", "du"),
             own("v", "dv"),
