@@ -72,7 +72,7 @@ impl Balance {
         Balance { e, k, w, share: 1.0, sizes: (0..s).map(|c| local.size(c)).collect() }
     }
 
-    /// The same motion as a start with a share of the local forces.
+    /// This motion as a start with a share of the local forces.
     pub(super) fn with_share(self, share: f64) -> Balance {
         Balance { share, ..self }
     }
@@ -144,7 +144,7 @@ impl Balance {
         None
     }
 
-    /// The same motion with as many harmonics as it needs, or can be solved with.
+    /// This motion with as many harmonics as it needs, or can be solved with.
     pub(super) fn refined(&self, local: &Local) -> Balance {
         let mut own = self.clone();
         while own.k < HIGHEST && own.tail() > TAIL {

@@ -43,7 +43,7 @@ pub(super) struct Bounces {
     tally: Tally,
 }
 
-/// What was tried.
+/// Counts of starts and motions.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     /// Starts that nearly satisfy the balance, and those of them that Newton's method corrected.
