@@ -14,6 +14,7 @@
 //! **Source.** friswell2010, sections 5 and 7 (rotating coordinates).
 
 use crate::assembly::{Assembly, Of, Refusal, turned};
+use crate::film;
 use crate::parts::{Centre, Coefficient, Contact, Frame, Law, Rotor, number};
 use foldline::model::{Definition, Forcing, ModelSource, Output, State, constant_value};
 use foldline_general::{Factored, Mat};
@@ -206,6 +207,17 @@ impl Assembled {
                 forces[first + k].push_str(&format!(" + rotor_{}_{axis}", own.name));
             }
         }
+        for own in &self.rotor.films {
+            let first = self.rotor.first(own.at);
+            let velocities = [self.inertial(names, first), self.inertial(names, first + 1)];
+            let places = [names[first].as_str(), names[first + 1].as_str()];
+            for (name, text) in film::definitions(own, places, velocities.each_ref().map(String::as_str), self.axes()) {
+                define(name, text);
+            }
+            for (k, axis) in self.axes().into_iter().enumerate() {
+                forces[first + k].push_str(&format!(" + rotor_{}_{axis}", own.name));
+            }
+        }
         for own in &self.rotor.forces {
             let first = self.rotor.first(own.at);
             let [x, y] = [&names[first], &names[first + 1]];
@@ -306,12 +318,15 @@ impl Assembled {
     fn principal(&self) -> usize {
         let rotor = &self.rotor;
         let ring = rotor.contacts.first().map(|own| own.at);
+        let ring = ring.or(rotor.films.first().map(|own| own.at));
         ring.or(rotor.unbalances.first().map(|own| own.at)).or(rotor.discs.first().map(|own| own.at)).unwrap_or(0)
     }
 
     /// Characteristic displacement and rotation.
     fn sizes(&self, source: &ModelSource) -> [Option<f64>; 2] {
-        let clearances = self.rotor.contacts.iter().filter_map(|own| self.value(&own.clearance, source));
+        let rings = self.rotor.contacts.iter().map(|own| &own.clearance);
+        let gaps = rings.chain(self.rotor.films.iter().map(|own| &own.clearance));
+        let clearances = gaps.filter_map(|own| self.value(own, source));
         let smallest = clearances.filter(|c| *c > 0.0).fold(f64::INFINITY, f64::min);
         let eccentric = || {
             let amounts = self.rotor.unbalances.iter().filter_map(|own| self.value(&own.amount, source));
@@ -351,6 +366,11 @@ impl Assembled {
             let text = format!("max({d} - {}, 0)", own.clearance.shown());
             add(format!("penetration_{}", own.name), text, "m", format!("penetration into the ring `{}`", own.name));
         }
+        for own in &self.rotor.films {
+            let what =
+                format!("distance of the journal from the centre of the film `{}`, over its clearance", own.name);
+            add(format!("eccentricity_{}", own.name), format!("rotor_{}_eps", own.name), "1", what);
+        }
         if let Some(power) = self.power(names) {
             add("power".into(), power, "W", "power that the drive supplies to hold the speed".into());
         }
@@ -361,6 +381,7 @@ impl Assembled {
         let rotor = &self.rotor;
         let mut list = vec![self.principal()];
         list.extend(rotor.contacts.iter().map(|own| own.at));
+        list.extend(rotor.films.iter().map(|own| own.at));
         list.extend(rotor.probes.iter().copied());
         list.extend(rotor.unbalances.iter().map(|own| own.at));
         list.extend(rotor.forces.iter().map(|own| own.at));

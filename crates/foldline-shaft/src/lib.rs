@@ -19,6 +19,7 @@
 mod assembly;
 mod campbell;
 mod equations;
+mod film;
 mod isotropy;
 mod machine;
 mod modes;
@@ -32,8 +33,8 @@ pub use equations::{Assembled, SPEED};
 pub use machine::{Linear, Load, Machine};
 pub use modes::{Mode, Whirl};
 pub use parts::{
-    Bearing, Centre, Coefficient, Contact, Damping, Disc, Element, Force, Frame, Given, Law, PointMass, Rotor, Station,
-    Unbalance,
+    Bearing, Centre, Coefficient, Contact, Damping, Disc, Element, Film, Force, Frame, Given, Law, PointMass, Rotor,
+    Station, Unbalance,
 };
 pub use response::Orbit;
 pub use section::{Matrices, Plane, Section};

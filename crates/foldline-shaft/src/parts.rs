@@ -157,6 +157,25 @@ pub struct Contact {
     pub centre: Centre,
 }
 
+/// Squeeze film between a journal that does not rotate and the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Name.
+    pub name: String,
+    /// Station.
+    pub at: usize,
+    /// Radial clearance.
+    pub clearance: Coefficient,
+    /// Radius of the journal.
+    pub radius: Coefficient,
+    /// Length of the land.
+    pub length: Coefficient,
+    /// Dynamic viscosity.
+    pub viscosity: Coefficient,
+    /// True if the film cavitates where the gap opens.
+    pub half: bool,
+}
+
 /// Any other force on a station, as expressions of local displacements and velocities.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Force {
@@ -235,6 +254,8 @@ pub struct Rotor {
     pub unbalances: Vec<Unbalance>,
     /// Rings.
     pub contacts: Vec<Contact>,
+    /// Squeeze films.
+    pub films: Vec<Film>,
     /// Other forces.
     pub forces: Vec<Force>,
     /// Damping of the shaft.

@@ -34,6 +34,7 @@ pub fn load(file: &Path, set: &[String]) -> Result<Loaded, Failure> {
     let parameters = parameters(set, &model)?;
     let rotor = &machine.assembled.rotor;
     let mut left: Vec<String> = rotor.contacts.iter().map(|own| format!("the ring `{}`", own.name)).collect();
+    left.extend(rotor.films.iter().map(|own| format!("the film `{}`", own.name)));
     left.extend(rotor.forces.iter().map(|own| format!("the force at {}", rotor.called(own.at))));
     if !left.is_empty() {
         report(format_args!("note: linear rotor, without {}", left.join(", ")))?;

@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 31] = [
+const ROOT_KEYS: [&str; 32] = [
     "name",
     "description",
     "source",
@@ -53,6 +53,7 @@ const ROOT_KEYS: [&str; 31] = [
     "bearing",
     "point-mass",
     "unbalance",
+    "film",
     "contact",
     "force",
 ];

@@ -52,6 +52,7 @@ use runner::PATIENT;
 pub use sampling::Sampling;
 pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
+pub(crate) use spectrum::ratio_of_samples;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
 
 use crate::contract::VectorField;

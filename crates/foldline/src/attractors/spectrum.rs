@@ -53,6 +53,11 @@ pub fn spectral_ratio(cycle: &Cycle, whirl: [usize; 2]) -> Option<(u32, u32)> {
     lines(sampled(cycle, whirl))?.0
 }
 
+/// The ratio of [`spectral_ratio`] from uniform samples of z over one period, end point excluded.
+pub(crate) fn ratio_of_samples(z: Vec<Complex64>) -> Option<(u32, u32)> {
+    lines(z)?.0
+}
+
 /// Sense of whirl: forward if z turns from the first state of the whirl plane towards the second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sense {

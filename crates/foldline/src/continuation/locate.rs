@@ -601,6 +601,8 @@ fn relocate(
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
     };
+    // Rounds after which the outward search would only repeat itself.
+    const OUTWARDS: usize = 19;
     // The closest known point with the other sign. If the monitor bends sharply, secant steps may overshoot this point
     // and are replaced by bisection.
     let mut other: Option<f64> = None;
@@ -620,6 +622,8 @@ fn relocate(
         let mut b = a + step;
         match other {
             Some(o) if (b - a) * (b - o) >= 0.0 => b = 0.5 * (a + o),
+            // The search below has covered both sides.
+            None if round > OUTWARDS => break,
             None if b.abs() > reach || round > 7 => {
                 // No bracket yet: search outwards on both sides alternately, farther each time.
                 let sign = if round % 2 == 0 { 1.0 } else { -1.0 };

@@ -13,6 +13,7 @@
 //! | how is a run interrupted immediately? | `interrupt` |
 //! | where do first solutions come from? | [`seeds`], those of maps `maps` |
 //! | what is done first, by which thread? | `schedule` |
+//! | where do cycles of large rotors come from? | `bounces` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
 //! | how is a diagram found without prescribed starts? | `discovery`, `lookout`, `resonances`, `averaged` |
@@ -30,6 +31,7 @@ mod arrival;
 mod averaged;
 mod axis;
 pub mod basins;
+mod bounces;
 mod choice;
 mod connections;
 mod corner;

@@ -6,6 +6,7 @@
 
 use super::System;
 use super::arcs::from_arc;
+use super::bounces::{bounces, instead_of_samples};
 use super::choice::{Choice, is_meant, missing, summary};
 use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
@@ -142,6 +143,14 @@ impl<'p> Seeds<'p> {
         found.into_iter().next()
     }
 
+    /// A cycle with this ratio of frequencies, by the balance of harmonics.
+    fn bouncing(&self, seed: &SeedPlan, ratio: (u32, u32)) -> Result<Point, String> {
+        let found = bounces(self.system, &seed.parameters, ratio, self.plan.tolerance)?;
+        let Some(first) = found.cycles.first() else { return Err(found.none(ratio)) };
+        self.observer.observe(Event::Note(&seed.name, &found.told(ratio)));
+        Ok(first.clone())
+    }
+
     fn found(&self, index: usize) -> Result<Point, String> {
         let (system, plan, seed) = (self.system, self.plan, &self.plan.seeds[index]);
         if !self.needed[index] {
@@ -165,13 +174,23 @@ impl<'p> Seeds<'p> {
                 if let Some(why) = in_families(system, seed) {
                     return Err(format!("no equilibrium is isolated{why}"));
                 }
+                if let Some(ratio) = balanced(system, seed) {
+                    return self.bouncing(seed, ratio).map(|point| with_degree(point, plan.degree));
+                }
                 let census = self.census(self.census_of(index).ok_or("no samples were taken")?);
                 let choice = Choice::of(system, plan.tolerance, census, key);
                 if let Some(said) = choice.told(system) {
                     self.observer.observe(Event::Note(&seed.name, &said));
                 }
                 let found = choice.taken().cloned().or_else(|| self.unstable(seed, key));
-                found.ok_or_else(|| missing(system, seed, census, key))?
+                match (found, key) {
+                    (Some(found), _) => found,
+                    (None, AttractorKey::Ratio(p, q)) => {
+                        let other = self.bouncing(seed, (*p, *q));
+                        other.map_err(|_| missing(system, seed, census, key))?
+                    }
+                    (None, _) => return Err(missing(system, seed, census, key)),
+                }
             }
         };
         Ok(with_degree(point, plan.degree))
@@ -215,11 +234,23 @@ fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
     a.parameters == b.parameters && a.samples == b.samples && a.random == b.random
 }
 
+/// The ratio of a seed whose first solution is sought by the balance of harmonics instead of sampling.
+fn balanced(system: &System, seed: &SeedPlan) -> Option<(u32, u32)> {
+    match seed.source {
+        SeedSource::Attractor(AttractorKey::Ratio(p, q)) if instead_of_samples(system, &seed.parameters) => {
+            Some((p, q))
+        }
+        _ => None,
+    }
+}
+
 /// Returns the seeds that need a sampling; of those that share one, the first.
 fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
     let mut first: Vec<usize> = Vec::new();
     for (index, seed) in plan.seeds.iter().enumerate() {
-        let sampled = matches!(seed.source, SeedSource::Attractor(_)) && in_families(system, seed).is_none();
+        let sampled = matches!(seed.source, SeedSource::Attractor(_))
+            && in_families(system, seed).is_none()
+            && !(needed[index] && balanced(system, seed).is_some());
         let repeats = system.repeats(&seed.parameters, &[]).is_ok();
         if needed[index] && sampled && repeats && !first.iter().any(|other| share(&plan.seeds[*other], seed)) {
             first.push(index);

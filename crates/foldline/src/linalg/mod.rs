@@ -18,6 +18,7 @@ pub mod panel;
 pub mod periodic_schur;
 pub mod reflect;
 pub mod shape;
+pub mod span;
 pub mod system;
 pub(crate) mod tile;
 

@@ -2,6 +2,7 @@
 
 use crate::contract::Monitor;
 use crate::diagram::{Kind, Point};
+use crate::linalg::dense::MANY;
 use num_complex::Complex64;
 
 /// Distance of a product of two multipliers from 1 that is rounding: those of an area-preserving map have the product 1
@@ -25,7 +26,18 @@ impl Monitor for Torus {
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let z = at.free_spectrum();
         let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| (i, j)));
-        pairs.map(|(i, j)| z[i] * z[j]).map(off).product::<Complex64>().re
+        let factors = pairs.map(|(i, j)| z[i] * z[j]).map(off);
+        if z.len() < MANY {
+            return factors.product::<Complex64>().re;
+        }
+        // Of very many factors the product varies by many orders of magnitude along a step, so that only its sign and the
+        // smallest factor, which is the one that vanishes, are of use.
+        let start = (Complex64::new(1.0, 0.0), f64::INFINITY);
+        let (turn, smallest) = factors.fold(start, |(turn, smallest), own| {
+            let size = own.norm();
+            (turn * own / size, smallest.min(size))
+        });
+        smallest.copysign(turn.re)
     }
 
     fn confirms(&self, at: &Point) -> bool {

@@ -3,7 +3,7 @@
 use super::Draft;
 use crate::model_file::Reader;
 use foldline::model::{Field, Function, Item, ModelSource};
-use foldline_shaft::{Assembled, Centre, Coefficient, Contact, Force, Frame, Law, Rotor, Unbalance};
+use foldline_shaft::{Assembled, Centre, Coefficient, Contact, Film, Force, Frame, Law, Rotor, Unbalance};
 use std::ops::Range;
 use toml::de::DeTable;
 
@@ -80,6 +80,48 @@ impl Reader<'_> {
                     law,
                     centre,
                 });
+            }
+        }
+    }
+
+    /// Reads squeeze films.
+    pub(super) fn films(&mut self, root: &DeTable, source: &mut ModelSource, draft: &mut Draft, rotor: &mut Rotor) {
+        const KEYS: [&str; 8] = ["name", "node", "at", "clearance", "radius", "length", "viscosity", "half"];
+        for (k, (span, table)) in self.walk.tables(root, "film").into_iter().enumerate() {
+            let name = match table.get("name") {
+                Some(own) => self.walk.string(own, "the name of the film").unwrap_or_default(),
+                None if k == 0 => "film".to_string(),
+                None => format!("film_{}", k + 1),
+            };
+            let plain = name.chars().all(|c| c.is_alphanumeric() || c == '_') && !name.is_empty();
+            let rings = rotor.contacts.iter().map(|own| &own.name);
+            if !plain || rings.chain(rotor.films.iter().map(|own| &own.name)).any(|own| *own == name) {
+                let hint = "use letters, digits and underscores, and each name of a ring or film once";
+                self.walk.report(span.clone(), format!("`{name}` cannot name a film"), hint);
+                continue;
+            }
+            let whose = format!("the film `{name}`");
+            self.walk.only(table, &KEYS, &whose);
+            let at = self.station(&span, table, &whose, rotor, source);
+            let mut own = |reader: &mut Self, key: &str, unit: &str, example: &str| {
+                reader.required(&span, table, key, [&whose, unit, example], source, draft)
+            };
+            let clearance = own(self, "clearance", "m", "\"0.1 mm\"");
+            let radius = own(self, "radius", "m", "\"50 mm\"");
+            let length = own(self, "length", "m", "\"20 mm\"");
+            let viscosity = own(self, "viscosity", "Pa s", "\"0.02 Pa s\"");
+            let half = match table.get("half") {
+                Some(value) => value.get_ref().as_bool().unwrap_or_else(|| {
+                    let hint = "write `half = true` for a film that cavitates where the gap opens, or `half = false`";
+                    self.walk.report(value.span(), format!("`half` of {whose} is not true or false"), hint);
+                    true
+                }),
+                None => true,
+            };
+            if let (Some(at), Some(clearance), Some(radius), Some(length), Some(viscosity)) =
+                (at, clearance, radius, length, viscosity)
+            {
+                rotor.films.push(Film { name, at, clearance, radius, length, viscosity, half });
             }
         }
     }

@@ -18,8 +18,8 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
 /// Sections of a rotor.
-pub(super) const SECTIONS: [&str; 9] =
-    ["rotor", "material", "shaft", "disc", "bearing", "point-mass", "unbalance", "contact", "force"];
+pub(super) const SECTIONS: [&str; 10] =
+    ["rotor", "material", "shaft", "disc", "bearing", "point-mass", "unbalance", "contact", "film", "force"];
 const KEYS: [&str; 8] = ["speed", "frame", "gravity", "damping", "modal-damping", "scale", "probes", "matrices"];
 
 /// Maximum number of degrees of freedom: a model can have up to 1000 states.
@@ -131,6 +131,7 @@ impl Reader<'_> {
             bearings: Vec::new(),
             unbalances: Vec::new(),
             contacts: Vec::new(),
+            films: Vec::new(),
             forces: Vec::new(),
             damping: Damping::default(),
             speed: speed.unwrap_or(Coefficient::ZERO),
@@ -161,6 +162,7 @@ impl Reader<'_> {
         self.bearings(root, source, draft, &mut rotor);
         self.unbalances(root, source, draft, &mut rotor);
         self.contacts(root, source, draft, &mut rotor);
+        self.films(root, source, draft, &mut rotor);
         self.forces(root, source, draft, &mut rotor);
         if let Some(list) = table.get("probes") {
             match list.get_ref().as_array() {

@@ -22,6 +22,7 @@ use crate::linalg::dense::MANY;
 use crate::linalg::local::interval::{Common, Interval, Weights};
 use crate::linalg::local::modes::Modes;
 use crate::linalg::local::{Link, LocalSystem, Parts, carry, changed};
+use crate::linalg::span::spanned;
 use crate::linalg::{axpy, dot, panel};
 use crate::problem::gauss::Scheme;
 use crate::problem::piecewise::{self, Switched};
@@ -30,9 +31,6 @@ use num_complex::Complex64;
 
 /// Largest number of local forces.
 const MOST: usize = 12;
-
-/// Variation, relative to the largest, that counts as rounding.
-const ROUNDING: f64 = 1e-12;
 
 /// Number of intervals whose Jacobians are evaluated together.
 const FEW: usize = 8;
@@ -99,33 +97,14 @@ impl Structure {
 
     /// Finds Q by orthogonalisation, the largest variation first.
     fn span(&mut self, fx: &[f64], lanes: usize) -> Option<()> {
-        let n = self.sizes.len();
         let mut left: Vec<Vec<f64>> = Vec::new();
         for k in &self.columns {
             left.extend(
                 (0..lanes).map(|lane| self.variation(fx, lanes, lane, *k)).filter(|v| v.iter().any(|x| *x != 0.0)),
             );
         }
-        let norm = |v: &Vec<f64>| dot(v, v).sqrt();
-        let largest = left.iter().map(norm).fold(0.0, f64::max);
-        loop {
-            let next = left.iter().max_by(|a, b| norm(a).total_cmp(&norm(b))).filter(|v| norm(v) > ROUNDING * largest);
-            let Some(next) = next else { return Some(()) };
-            if self.basis.len() == MOST * n {
-                return None;
-            }
-            let length = norm(next);
-            let own: Vec<f64> = next.iter().map(|x| x / length).collect();
-            for v in &mut left {
-                // Twice, so that rounding leaves nothing behind.
-                for _ in 0..2 {
-                    let along = dot(&own, v);
-                    axpy(-along, &own, v);
-                }
-            }
-            left.retain(|v| norm(v) > ROUNDING * largest);
-            self.basis.extend(own);
-        }
+        self.basis = spanned(left, MOST)?;
+        Some(())
     }
 
     fn forces(&self) -> usize {
