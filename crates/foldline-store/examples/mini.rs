@@ -23,15 +23,27 @@ fn main() {
             for s in &b.special {
                 println!(
                     "  {:?} {} pars {:.12?} period {:?} err {:.1e} disc {:.1e} {} {:.3?}",
-                    s.kind, s.point.position, &s.point.parameters[..study.model.parameters.len()], s.point.solution.period(),
-                    s.error, s.point.trust.discretisation, s.remark, s.coefficients
+                    s.kind,
+                    s.point.position,
+                    &s.point.parameters[..study.model.parameters.len()],
+                    s.point.solution.period(),
+                    s.error,
+                    s.point.trust.discretisation,
+                    s.remark,
+                    s.coefficients
                 );
             }
             if b.is_connecting() {
                 if std::env::var("FLIPS").is_ok() {
                     use foldline::contract::VectorField;
                     let system = System::of_plan(&study.model, &study.plan);
-                    let f = foldline::problem::connecting::ConnectingField::of_stored(system.field, &system.scales, 1, &b.points[0].parameters).unwrap();
+                    let f = foldline::problem::connecting::ConnectingField::of_stored(
+                        system.field,
+                        &system.scales,
+                        1,
+                        &b.points[0].parameters,
+                    )
+                    .unwrap();
                     for p in &b.points {
                         let foldline::diagram::Solution::Cycle(c) = &p.solution else { continue };
                         let v = f.flips(c, &p.parameters).map(|t| t.map(|t| t.value));
@@ -40,7 +52,14 @@ fn main() {
                 }
                 for p in &b.points {
                     let k = study.model.parameters.len();
-                    println!("    {} {:.12?} T {:.3} disc {:.1e} eig {:.4?}", p.position, &p.parameters[..k], p.parameters[k], p.trust.discretisation, p.spectrum);
+                    println!(
+                        "    {} {:.12?} T {:.3} disc {:.1e} eig {:.4?}",
+                        p.position,
+                        &p.parameters[..k],
+                        p.parameters[k],
+                        p.trust.discretisation,
+                        p.spectrum
+                    );
                 }
             }
         }

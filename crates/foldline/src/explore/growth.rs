@@ -728,8 +728,8 @@ impl Growth<'_> {
         }
         // A connecting orbit that has come to need longer ends goes on with them.
         for _ in 0..LENGTHENINGS {
-            let short = connecting
-                && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
+            let short =
+                connecting && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
             let there = latest.borrow().clone();
             let Some(mut next) = Some(there)
                 .filter(|_| short && !self.observer.stopping())
@@ -740,22 +740,7 @@ impl Growth<'_> {
             next.position += if side == 1 { 1 } else { -1 };
             let mut problem = line.problem(&system, self.degree, &next);
             let Ok(start) = revived(&mut *problem, self.settings, &next, direction) else { break };
-            let mut walk = Follow {
-                problem: &mut *problem,
-                settings: self.settings,
-                monitors: &monitors,
-                marks: &marks,
-                collapses: &collapses,
-                limit: &|_| None,
-                corner: &|_| None,
-                direction,
-                symmetric,
-                holds: false,
-                free: branch_free,
-                home: home.as_ref(),
-                homecoming: Homecoming::default(),
-                inspected: 0.0,
-            };
+            let mut walk = Follow { holds: false, limit: &|_| None, corner: &|_| None, ..walk.on(&mut *problem) };
             let position = next.position.unsigned_abs() as usize;
             ending = match sink(Item::Point(next)) == Verdict::Stop {
                 true => Ending::Stopped,
