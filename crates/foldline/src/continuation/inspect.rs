@@ -127,9 +127,6 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
-        // Where all multipliers are far from the unit circle and none of their digits is known, none is seen to pass it.
-        let unknown = |station: &Station| station.point.trust.spectrum.is_nan() && is_far(&station.point);
-        let doubtful = !left.mesh.is_empty() && unknown(left) && unknown(right);
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -191,7 +188,6 @@ impl Follow<'_> {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
-                Ok(_) if jump > 0 && doubtful => lost = true,
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
@@ -387,7 +383,11 @@ impl Follow<'_> {
         let met = passed
             .iter()
             .any(|(_, times, jump)| *jump == 2 && passed.iter().any(|(_, other, own)| *own == 1 && times * other < 0));
-        if passed.is_empty() || met || change != right.point.unstable as i64 - left.point.unstable as i64 {
+        // A multiplier far from the unit circle that is computed with another sign has not passed it.
+        let flipped = matches!(&passed[..], [(_, one, 1), (_, other, 1)] if one + other == 0)
+            && is_far(&left.point)
+            && is_far(&right.point);
+        if passed.is_empty() || met || flipped || change != right.point.unstable as i64 - left.point.unstable as i64 {
             return None;
         }
         passed.sort_by_key(|(_, times, _)| *times);
