@@ -609,7 +609,7 @@ impl Growth<'_> {
             tolerance: self.settings.tolerance,
         };
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
-        let (line, free_cycles) = (self.line(branch), branch.held.is_none() && !system.field.forced());
+        let free_cycles = branch.held.is_none() && !system.field.forced();
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
