@@ -15,7 +15,10 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
-use crate::special::on_connections::{self, limit::Limit};
+use crate::special::on_connections::{
+    self,
+    limit::{self, Limit},
+};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
@@ -608,6 +611,8 @@ impl Growth<'_> {
         };
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
         let (branch_free, free_cycles) = (branch.free, branch.held.is_none() && !system.field.forced());
+        let (connecting, line) = (branch.is_connecting(), self.line(branch));
+        let at_axis = |at: &Point| limit::reached(at, branch_free).filter(|_| connecting);
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -615,7 +620,7 @@ impl Growth<'_> {
             marks: &marks,
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
-            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
+            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners).or_else(|| at_axis(at)),
             direction,
             symmetric,
             holds,
@@ -632,7 +637,6 @@ impl Growth<'_> {
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
-        let (connecting, line) = (branch.is_connecting(), self.line(branch));
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -753,7 +757,7 @@ impl Growth<'_> {
                 marks: &marks,
                 collapses: &collapses,
                 limit: &|_| None,
-                corner: &|_| None,
+                corner: &at_axis,
                 direction,
                 symmetric,
                 holds: false,
@@ -773,7 +777,9 @@ impl Growth<'_> {
             return Ending::Stopped;
         }
         match ending {
-            Ending::StepTooSmall(why) | Ending::GivenUp(why) | Ending::MeshTooLarge(why) if branch.is_connecting() => {
+            Ending::StepTooSmall(_) | Ending::GivenUp(_) | Ending::MeshTooLarge(_) | Ending::Joined { .. }
+                if branch.is_connecting() =>
+            {
                 let points: Vec<&Point> = match side {
                     1 => branch.points.iter().rev().collect(),
                     _ => branch.points.iter().collect(),
@@ -789,7 +795,7 @@ impl Growth<'_> {
                             false => Ending::Stopped,
                         }
                     }
-                    None => Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why)),
+                    None => Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), limit::told(ending))),
                 }
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {

@@ -20,7 +20,7 @@
 //! **Departures.** Extrapolation in place of conditions at the saddle-node.
 
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Kind, Point, SpecialPoint};
+use crate::diagram::{Ending, Kind, Point, SpecialPoint};
 use crate::linalg::{dot, larger, lu};
 
 /// Largest number of points used.
@@ -31,6 +31,25 @@ const NEAR: f64 = 0.1;
 const SURE: f64 = 1e-4;
 /// Smallest |⟨w, f_p⟩| / (|w| |f_p|) at a saddle-node. Order of magnitude: 0 if the equilibrium persists.
 const TRANSVERSAL: f64 = 1e-3;
+
+/// Ratio of the smallest to the largest distance from the axis at which a curve is not followed any further.
+const REACHED: f64 = 1e-3;
+
+/// The end of a curve in the parameter `free` at a point whose saddle has an eigenvalue next to the axis, if it has.
+pub fn reached(at: &Point, free: usize) -> Option<Ending> {
+    let (rho, real) = nearest(at)?;
+    let largest = at.spectrum.iter().map(|z| z.re.abs()).fold(0.0, larger);
+    let kind = if real { Kind::NonCentral } else { Kind::ShilnikovHopf };
+    (rho.abs() < REACHED * largest).then(|| Ending::Joined { at: kind, parameter: at.parameters[free] })
+}
+
+/// The text of an ending for which there is no [`Limit`].
+pub fn told(ending: Ending) -> String {
+    match ending {
+        Ending::StepTooSmall(why) | Ending::GivenUp(why) | Ending::MeshTooLarge(why) => why,
+        other => format!("an eigenvalue of the equilibrium comes close to the imaginary axis ({})", other.code()),
+    }
+}
 
 /// End of a curve.
 pub struct Limit {
