@@ -1,8 +1,8 @@
 //! `[[curve]]`: special points continued in two parameters.
 
 use super::branches::{bounds, free, marks, range, switch_step};
-use super::seeds::state;
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
+use super::seeds::state;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
 use foldline::contract::VectorField;

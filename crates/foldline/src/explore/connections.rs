@@ -11,8 +11,8 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use super::seeds::bare;
 use super::shooting::Search;
-use crate::continuation::{Failure, Settings};
 use crate::continuation::corrector::parameter_row;
+use crate::continuation::{Failure, Settings};
 use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution};
 use crate::linalg::{lu, max_abs};
@@ -411,7 +411,8 @@ fn shot<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branch)
         count,
         gain: &[],
     };
-    let start = pieced(system, plan, &orbit)?.ok_or("the orbit found by shooting does not come close enough to the saddle")?;
+    let start =
+        pieced(system, plan, &orbit)?.ok_or("the orbit found by shooting does not come close enough to the saddle")?;
     settled(system, plan, curve, parent.free, start)
 }
 

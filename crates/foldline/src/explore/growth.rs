@@ -738,8 +738,8 @@ impl Growth<'_> {
         }
         // A connecting orbit that has come to need longer ends goes on with them.
         for _ in 0..LENGTHENINGS {
-            let short = connecting
-                && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
+            let short =
+                connecting && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
             let there = latest.borrow().clone();
             let Some(mut next) = Some(there)
                 .filter(|_| short && !self.observer.stopping())

@@ -119,9 +119,8 @@ impl Search<'_> {
         for pair in points.windows(2) {
             for k in 0..pieces {
                 let share = k as f64 / pieces as f64;
-                let mixed = |a: &[f64], b: &[f64]| -> Vec<f64> {
-                    a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect()
-                };
+                let mixed =
+                    |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + share * (b - a)).collect() };
                 let parameters = mixed(&pair[0].0.parameters, &pair[1].0.parameters);
                 let value = parameters[self.free];
                 if value < self.range[0] || value > self.range[1] {
@@ -211,9 +210,7 @@ impl Search<'_> {
     ) -> (Vec<Pass>, Vec<(f64, Vec<f64>)>) {
         let system = self.system;
         let (n, target) = (system.field.dim(), &saddles.at[places[1]]);
-        let deviation = |x: &[f64]| -> Vec<f64> {
-            (0..n).map(|c| (x[c] - target[c]) / system.scales[c]).collect()
-        };
+        let deviation = |x: &[f64]| -> Vec<f64> { (0..n).map(|c| (x[c] - target[c]) / system.scales[c]).collect() };
         let approach = |_: f64, x: &[f64]| {
             let mut f = vec![0.0; n];
             let parameters = Parameters::Shared(&saddles.parameters);
@@ -331,7 +328,9 @@ impl Search<'_> {
             });
             let [Some(x0), Some(x1)] = at else { return None };
             let middle = Saddles { parameters, at: [x0, x1] };
-            let Some(own) = self.passes(&middle, forwards, Some(half), &mut refer)?[half].get(pass).copied() else { break };
+            let Some(own) = self.passes(&middle, forwards, Some(half), &mut refer)?[half].get(pass).copied() else {
+                break;
+            };
             if own.across * low.across > 0.0 {
                 (a, low) = (middle, own);
             } else {
@@ -383,14 +382,8 @@ impl Search<'_> {
         }
         let mesh: Vec<f64> = path.iter().map(|(t, _)| (t - t0) / (t1 - t0)).collect();
         let gain: Vec<f64> = path.last()?.1.iter().zip(&path.first()?.1).map(|(b, a)| b - a).collect();
-        let cycle = Cycle {
-            period: t1 - t0,
-            forcing_periods: 0,
-            mesh: mesh.into(),
-            degree: self.degree,
-            profile,
-            gain,
-        };
+        let cycle =
+            Cycle { period: t1 - t0, forcing_periods: 0, mesh: mesh.into(), degree: self.degree, profile, gain };
         let places = if self.to.is_some() { saddles.at.concat() } else { saddles.at[0].clone() };
         Some(Shot { parameters: saddles.parameters.clone(), places, cycle })
     }
@@ -399,7 +392,8 @@ impl Search<'_> {
 /// A sentence about saddles between which there is nothing to search for.
 fn no_saddles(counts: &[[usize; 2]], n: usize) -> String {
     let Some([a, b]) = counts.first() else {
-        return "the equilibria of the branch and of `to` were not found, or are next to bifurcations everywhere".into();
+        return "the equilibria of the branch and of `to` were not found, or are next to bifurcations everywhere"
+            .into();
     };
     let what = if a != b {
         "such orbits exist for all values of the parameter, or need more than one parameter"

@@ -148,7 +148,8 @@ impl Monitor for OnConnection<'_> {
             return self.tested(at).unwrap_or(f64::NAN);
         }
         let Some(known) = self.turning(reference) else { return f64::NAN };
-        self.turning(at).map_or(f64::NAN, |own| if dot(&own.refer, &known.refer) < 0.0 { -own.value } else { own.value })
+        self.turning(at)
+            .map_or(f64::NAN, |own| if dot(&own.refer, &known.refer) < 0.0 { -own.value } else { own.value })
     }
 
     fn confirms(&self, at: &Point) -> bool {

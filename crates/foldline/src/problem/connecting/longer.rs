@@ -31,7 +31,9 @@ impl Path {
         let (s2, s3) = (s * s, s * s * s);
         let weights = [2.0 * s3 - 3.0 * s2 + 1.0, h * (s3 - 2.0 * s2 + s), 3.0 * s2 - 2.0 * s3, h * (s3 - s2)];
         let [x0, v0, x1, v1] = [&self.states[k], &self.slopes[k], &self.states[k + 1], &self.slopes[k + 1]];
-        (0..x0.len()).map(|c| weights[0] * x0[c] + weights[1] * v0[c] + weights[2] * x1[c] + weights[3] * v1[c]).collect()
+        (0..x0.len())
+            .map(|c| weights[0] * x0[c] + weights[1] * v0[c] + weights[2] * x1[c] + weights[3] * v1[c])
+            .collect()
     }
 }
 
