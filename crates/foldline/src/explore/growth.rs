@@ -15,10 +15,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
-use crate::special::on_connections::{
-    self,
-    limit::{self, Limit},
-};
+use crate::special::on_connections::{self, limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
@@ -612,7 +609,7 @@ impl Growth<'_> {
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
         let (branch_free, free_cycles) = (branch.free, branch.held.is_none() && !system.field.forced());
         let (connecting, line) = (branch.is_connecting(), self.line(branch));
-        let at_axis = |at: &Point| limit::reached(at, branch_free).filter(|_| connecting);
+        let at_axis = |at: &Point| limit::reached(at).filter(|_| connecting);
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -777,26 +774,11 @@ impl Growth<'_> {
             return Ending::Stopped;
         }
         match ending {
-            Ending::StepTooSmall(_) | Ending::GivenUp(_) | Ending::MeshTooLarge(_) | Ending::Joined { .. }
-                if branch.is_connecting() =>
-            {
-                let points: Vec<&Point> = match side {
-                    1 => branch.points.iter().rev().collect(),
-                    _ => branch.points.iter().collect(),
-                };
-                match Limit::of(&points, branch.free, branch.held.map(|(_, first)| first), self.system.field) {
-                    Some(limit) => {
-                        let special = limit.special(&latest.borrow());
-                        let parameter = special.point.parameters[branch.free];
-                        let at = special.kind;
-                        branch.insert_special(special.clone());
-                        match self.tell(Event::Special(branch, &special)) {
-                            true => Ending::Joined { at, parameter },
-                            false => Ending::Stopped,
-                        }
-                    }
-                    None => Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), limit::told(ending))),
-                }
+            Ending::StepTooSmall(why) if branch.is_connecting() => {
+                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why))
+            }
+            Ending::GivenUp(why) if branch.is_connecting() => {
+                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {
                 Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))
