@@ -50,6 +50,9 @@ fn study(seed: &str, [free, range]: [&str; 2], [second, second_range]: [&str; 2]
     )
 }
 
+const BOGDANOV_TAKENS: &str =
+    "name = \"bt\"\n[parameters]\nb1 = -0.01\nb2 = 0.05\n[states]\nx = \"y\"\ny = \"b1 + b2*y + x^2 + x*y\"\n";
+
 const LORENZ: [&str; 2] = ["rho", "[5, 30]"];
 const WING: &str = "state = { x = 8, y = 8, z = 25 }\nparameters = { rho = 26 }";
 
@@ -165,11 +168,16 @@ fn branches_without_a_homoclinic_orbit_are_refused_with_the_reason() {
     let (folder, _) = desk("lorenz", &study(WING, ["rho", "[18, 30]"], ["sigma", "[9, 12]"], "10"));
     let (_, said) = run(folder.path(), 3);
     assert!(said.contains("has a period that grows without bound") && said.contains("what to do"), "{said}");
-    // The upper equilibria of the Lorenz equations have no homoclinic orbit here: they are stable, or have two unstable eigenvalues.
-    let (folder, _) =
-        desk("lorenz", &lorenz().replace("of = \"rest/hopf-1\"", "of = \"rest\"").replace("[5, 30]", "[25, 30]"));
-    let (_, said) = run(folder.path(), 3);
-    assert!(said.contains("no value of the parameter on the branch") || said.contains("does not come close"), "{said}");
+    // The loop of this saddle lies at b2 = 0.0717.
+    let study = from_rest(
+        "{ x = 0.1, y = 0 }",
+        ["b2", "[0.2, 0.3]"],
+        ["b1", "[-0.05, -0.005]"],
+        "-0.01",
+        "hold = \"homoclinic\"",
+    );
+    let (_, said) = run(desk_of(&BOGDANOV_TAKENS.replace("b2 = 0.05", "b2 = 0.25"), &study).path(), 3);
+    assert!(said.contains("no value of the parameter on the branch") && said.contains("what to do"), "{said}");
     // `to` belongs to heteroclinic orbits of equilibria.
     for (from, to, words) in [
         ("hold = \"homoclinic\"", "hold = \"homoclinic\"\nto = { x = 0, y = 0, z = 0 }", "second equilibrium"),
@@ -273,11 +281,9 @@ fn the_speed_of_the_bistable_front_is_that_of_the_closed_form() {
 /// Bogdanov–Takens normal form: numbers of a separate program, as in `reference/connecting.csv`.
 #[test]
 fn the_loop_of_the_bogdanov_takens_normal_form_starts_from_its_saddle() {
-    let model =
-        "name = \"bt\"\n[parameters]\nb1 = -0.01\nb2 = 0.05\n[states]\nx = \"y\"\ny = \"b1 + b2*y + x^2 + x*y\"\n";
     let more = "hold = \"homoclinic\"";
     let study = from_rest("{ x = 0.1, y = 0 }", ["b2", "[0.01, 0.3]"], ["b1", "[-0.05, -0.005]"], "-0.04, -0.01", more);
-    let (diagram, _) = run(desk_of(model, &study).path(), 0);
+    let (diagram, _) = run(desk_of(BOGDANOV_TAKENS, &study).path(), 0);
     let found = marked(&diagram, 1);
     assert_eq!(found.len(), 2, "{found:?}");
     // Tolerance of the reference: 2e-8.

@@ -811,9 +811,6 @@ impl fmt::Display for Ending {
             Ending::Joined { at: Kind::BoundaryEquilibrium, parameter } => {
                 write!(f, "ends at {:.9}, where the equilibrium reaches the surface of an event", Shown(*parameter))
             }
-            Ending::Joined { at: at @ (Kind::NonCentral | Kind::ShilnikovHopf), parameter } => {
-                write!(f, "ends at {at} {:.6}, where the equilibrium is no saddle any more", Shown(*parameter))
-            }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),

@@ -91,7 +91,14 @@ pub(super) fn follow(
                 let mut problem = line.problem(&own, plan.degree, &start.point);
                 match growth::polished(&mut *problem, &settings, &start.point) {
                     Ok(station) => growth.begin(&mut branch, Beginning::Inside(station)),
-                    Err(why) => super::family::without_start(observer, &mut branch, why.to_string()),
+                    Err(why) => super::family::without_start(
+                        observer,
+                        &mut branch,
+                        format!(
+                            "the orbit cannot be computed to the tolerance: {why}\nlikely cause: its ends are so close to the \
+                             equilibrium that rounding matters\nwhat to do: use a larger tolerance"
+                        ),
+                    ),
                 }
             }
         }
@@ -569,7 +576,13 @@ fn settled<'s>(
         if error <= goal || at_limit && error <= ENOUGH * tolerance {
             return Ok(start);
         }
-        if at_limit || error.is_nan() {
+        if error.is_nan() {
+            return Err("next to the orbit found, the equilibrium is not a saddle as at the start\nlikely cause: Newton's method led \
+                        to another equilibrium, which is close\nwhat to do: use another tolerance, or start at other values of the \
+                        parameters"
+                .into());
+        }
+        if at_limit {
             return Err(format!(
                 "the orbit cannot be lengthened until the error of its truncation, {error:.1e}, is below {goal:.1e}\n\
                  likely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where the \

@@ -17,7 +17,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
-use crate::special::on_connections::{self, limit::Limit};
+use crate::special::on_connections::{self, limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
 use crate::special::peak::Peak;
@@ -610,6 +610,8 @@ impl Growth<'_> {
         };
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
+        let (connecting, line) = (branch.is_connecting(), self.line(branch));
+        let at_axis = |at: &Point| limit::reached(at).filter(|_| connecting);
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -617,7 +619,7 @@ impl Growth<'_> {
             marks: &marks,
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
-            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
+            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners).or_else(|| at_axis(at)),
             direction,
             symmetric,
             holds,
@@ -637,7 +639,6 @@ impl Growth<'_> {
         let next_points: RefCell<Option<Points>> = RefCell::default();
         let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
-        let (connecting, line) = (branch.is_connecting(), self.line(branch));
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -740,7 +741,7 @@ impl Growth<'_> {
             next.position += if side == 1 { 1 } else { -1 };
             let mut problem = line.problem(&system, self.degree, &next);
             let Ok(start) = revived(&mut *problem, self.settings, &next, direction) else { break };
-            let mut walk = Follow { holds: false, limit: &|_| None, corner: &|_| None, ..walk.on(&mut *problem) };
+            let mut walk = Follow { holds: false, limit: &|_| None, corner: &at_axis, ..walk.on(&mut *problem) };
             let position = next.position.unsigned_abs() as usize;
             ending = match sink(Item::Point(next)) == Verdict::Stop {
                 true => Ending::Stopped,
@@ -783,24 +784,11 @@ impl Growth<'_> {
             }
         }
         match ending {
-            Ending::StepTooSmall(why) | Ending::GivenUp(why) | Ending::MeshTooLarge(why) if branch.is_connecting() => {
-                let points: Vec<&Point> = match side {
-                    1 => branch.points.iter().rev().collect(),
-                    _ => branch.points.iter().collect(),
-                };
-                match Limit::of(&points, branch.free, branch.held.map(|(_, first)| first), self.system.field) {
-                    Some(limit) => {
-                        let special = limit.special(&latest.borrow());
-                        let parameter = special.point.parameters[branch.free];
-                        let at = special.kind;
-                        branch.insert_special(special.clone());
-                        match self.tell(Event::Special(branch, &special)) {
-                            true => Ending::Joined { at, parameter },
-                            false => Ending::Stopped,
-                        }
-                    }
-                    None => Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why)),
-                }
+            Ending::StepTooSmall(why) if branch.is_connecting() => {
+                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why))
+            }
+            Ending::GivenUp(why) if branch.is_connecting() => {
+                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {
                 Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))

@@ -54,9 +54,9 @@ const KINDS: [Kind; 15] = [
     ),
     (
         &["homoclinic", "heteroclinic", "connection", "connectingorbit", "homcont"],
-        "connecting orbits cannot be continued",
-        "a branch of cycles that approaches one ends there and reports it with its parameter value; to continue it \
-         in two parameters use AUTO-07p (HomCont) or MATCONT",
+        "connecting orbits are curves in two parameters, which belong to a study",
+        "write a [[curve]] with `hold = \"homoclinic\"` or `\"heteroclinic\"`, `of` a branch of cycles that ends at one or of \
+         equilibria; for orbits homoclinic to a saddle-node use AUTO-07p (HomCont) or MATCONT",
     ),
     (
         &["frequencie", "secondfrequency", "frequency2"],
