@@ -105,7 +105,8 @@ fn homoclinic_orbits_of_the_lorenz_equations_start_where_cycles_end() {
         let root = ((sigma - 1.0f64).powi(2) + 4.0 * sigma * rho).sqrt();
         let mut known = [0.5 * (-1.0 - sigma + root), 0.5 * (-1.0 - sigma - root), -b];
         let mut found: Vec<f64> = point.spectrum.iter().map(|z| z.re).collect();
-        (known.sort_by(f64::total_cmp), found.sort_by(f64::total_cmp));
+        known.sort_by(f64::total_cmp);
+        found.sort_by(f64::total_cmp);
         assert!(known.iter().zip(&found).all(|(a, b)| (a - b).abs() < 1e-6 * (1.0 + a.abs())), "{known:?} {found:?}");
         assert!(point.trust.discretisation < 1e-8, "{:e}", point.trust.discretisation);
     }

@@ -199,7 +199,7 @@ impl ZeroProblem for BackboneProblem {
         let parameters = self.at(u[3]).parameters();
         let scheme = cycle.scheme();
         let ranges = match cycle.profile.iter().all(|x| x.is_finite()) && cycle.intervals() > 0 {
-            true => extremes::of_profile(&self.rotor, &parameters, [&cycle.profile, &cycle.mesh], 0, &scheme),
+            true => extremes::of_profile(&self.rotor, &parameters, [&cycle.profile, &cycle.mesh], 0, scheme),
             false => vec![[f64::NAN; 2]; 5],
         };
         let mut r = [0.0; SIZE];

@@ -57,7 +57,7 @@ pub struct Follow<'w> {
 }
 
 impl Follow<'_> {
-    /// The same on another problem, from a new start.
+    /// Continuation of another problem with these settings, from a new start.
     pub fn on<'p>(&'p self, problem: &'p mut dyn ZeroProblem) -> Follow<'p> {
         Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, ..*self }
     }

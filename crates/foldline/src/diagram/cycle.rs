@@ -78,7 +78,7 @@ impl Cycle {
         Scheme::at(self.degree, self.points)
     }
 
-    /// The same polynomials by their values at collocation points of another kind.
+    /// These polynomials by their values at collocation points of another kind.
     pub fn with_points(mut self, points: Points) -> Cycle {
         if self.points != points && self.degree > 0 {
             let (old, new, n) = (self.scheme(), Scheme::at(self.degree, points), self.dim());

@@ -1,8 +1,8 @@
 //! Change of the collocation points in the course of a branch.
 //!
 //! **Idea.** A mode may become fast along a branch, or a fast one may begin to grow. Where the multipliers are doubtful,
-//! or the mesh is large, the choice of the collocation points is made anew; see [`crate::problem::stiffness`]. The branch
-//! then goes on from the same solution at the other points. On either side of its start it changes to Radau points at most
+//! or the mesh is large, the collocation points are chosen again; see [`crate::problem::stiffness`]. The branch then
+//! continues from the same solution at the other points. On either side of its start it changes to Radau points at most
 //! once, and to Gauss points at most once.
 //!
 //! **Fails when** Newton's method does not converge at the other points; the branch then goes on at its own.
@@ -23,7 +23,7 @@ const LARGE: usize = 200;
 /// Collocation points other than those of a cycle that suit it better.
 pub(super) fn better(system: &System, at: &Point) -> Option<Points> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
-    let doubtful = !(at.trust.spectrum < DOUBTFUL) || cycle.intervals() > LARGE;
+    let doubtful = at.trust.spectrum.is_nan() || at.trust.spectrum > DOUBTFUL || cycle.intervals() > LARGE;
     let suited = || stiffness::suited(system.field, &system.scales, &at.parameters, cycle);
     if doubtful { Some(suited()).filter(|points| *points != cycle.points) } else { None }
 }

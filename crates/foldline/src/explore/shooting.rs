@@ -91,7 +91,7 @@ pub(super) struct Search<'s> {
     pub system: &'s System<'s>,
     pub free: usize,
     pub range: [f64; 2],
-    /// Value near which the connection is wanted.
+    /// Value near which the connection is requested.
     pub near: Option<f64>,
     /// State near the second saddle; `None` for a homoclinic orbit.
     pub to: Option<Vec<f64>>,

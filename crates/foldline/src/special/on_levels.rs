@@ -107,7 +107,7 @@ impl<'a> OnLevels<'a> {
         };
         let all = self.setting.at(parameters);
         let period = own[size] * self.setting.field.time_unit(&all);
-        Some(Solution::Cycle(Cycle { points: points, period, forcing_periods, mesh, degree, profile, gain }))
+        Some(Solution::Cycle(Cycle { points, period, forcing_periods, mesh, degree, profile, gain }))
     }
 }
 

@@ -412,7 +412,7 @@ impl Path {
         let mut x = vec![0.0; scales.len()];
         let mut most = 0.0;
         for (k, t) in self.times.iter().enumerate() {
-            cycle.state_into(&scheme, *t, &mut x);
+            cycle.state_into(scheme, *t, &mut x);
             let apart = |c: usize| (x[c] - self.states[c * count + k]).abs() / scales[c];
             most = (0..x.len()).fold(most, |m, c| larger(m, apart(c)));
         }

@@ -62,8 +62,11 @@ pub struct ConnectingField<'a> {
     unstable: usize,
     determined: Vec<usize>,
     /// The last results of [`VectorField::flips`], with the parameters, which tell one orbit from another.
-    turned_last: Mutex<Vec<(Vec<f64>, [Option<Turning>; 4])>>,
+    turned_last: Mutex<Vec<Turned>>,
 }
+
+/// Parameters and the results of [`VectorField::flips`] there.
+type Turned = (Vec<f64>, [Option<Turning>; 4]);
 
 /// An equilibrium, in units of the sizes of the states.
 struct Saddle {
