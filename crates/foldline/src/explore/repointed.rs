@@ -16,9 +16,9 @@ use crate::problem::gauss::Points;
 use crate::problem::stiffness;
 
 /// Error of the multipliers, and number of intervals, beyond which the points are put in question. Both only save the
-/// test where there is nothing to gain: smooth cycles have errors below 1e-6 on fewer than 100 intervals.
+/// test where there is little to gain: smooth cycles have errors below 1e-6 on fewer than 60 intervals.
 const DOUBTFUL: f64 = 1e-3;
-const LARGE: usize = 200;
+const LARGE: usize = 60;
 
 /// Collocation points other than those of a cycle that suit it better.
 pub(super) fn better(system: &System, at: &Point) -> Option<Points> {

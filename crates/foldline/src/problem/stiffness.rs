@@ -19,12 +19,9 @@ use crate::diagram::Cycle;
 use crate::linalg::dense::MANY;
 use crate::stability::eigenvalues;
 
-/// z beyond which modes are fast. For m = 4 and the 20 intervals that a smooth cycle needs, (1) is then still far below
-/// the errors of multipliers, but their estimate at Gauss points inverts transitions within an interval, of which only
-/// e^{-z} = 1e-11 is left.
-const FAST: f64 = 25.0;
-/// z, as a share of [`FAST`], below which a cycle at Radau points returns to Gauss points. Empirical, as the next constant.
-const SLOW: f64 = 0.25;
+/// z beyond which modes are fast. Empirical: the longest intervals of adapted meshes decay a few times as much as the
+/// average, so that at most 1e-11 of a mode is left there. The error estimate of multipliers at Gauss points inverts that.
+const FAST: f64 = 10.0;
 /// Share of [`GROWTH`] up to which Radau points are chosen for a cycle at Gauss points. Empirical: the next meshes have
 /// intervals of up to twice to three times the length, on which they should not have to be given up again.
 const AHEAD: f64 = 0.25;
@@ -55,6 +52,13 @@ pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle
     let (mut f, mut fx) = (vec![0.0; n * intervals], vec![0.0; n * n * intervals]);
     field.linearise(batch, &[], &mut f, &mut fx, &mut []);
     let period = if periods > 0.0 { periods } else { cycle.period };
+    // Sums of absolute values in rows bound all eigenvalues.
+    let row =
+        |j: usize, i: usize| (0..n).map(|l| fx[(i * n + l) * intervals + j].abs() * scales[l] / scales[i]).sum::<f64>();
+    let bound = |j: usize| (cycle.mesh[j + 1] - cycle.mesh[j]) * period * (0..n).map(|i| row(j, i)).fold(0.0, f64::max);
+    if cycle.points == Points::Gauss && (0..intervals).map(bound).sum::<f64>() < FAST * intervals as f64 {
+        return Points::Gauss;
+    }
     let (mut decay, mut unresolved) = (0.0, false);
     let most = GROWTH * if cycle.points == Points::Radau { 1.0 } else { AHEAD };
     for j in 0..intervals {
@@ -67,7 +71,7 @@ pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle
     let z = decay / intervals as f64;
     match cycle.points {
         Points::Gauss if z > FAST && !unresolved => Points::Radau,
-        Points::Radau if z < SLOW * FAST || unresolved => Points::Gauss,
+        Points::Radau if z < FAST || unresolved => Points::Gauss,
         points => points,
     }
 }

@@ -78,11 +78,10 @@ pub fn several<const K: usize>(courses: [Course; K], scale: &[f64]) -> Option<[F
         let log_others = periodic_schur::log_determinant(&grouped, n - trivial);
         let others = periodic_schur::eigenvalues(&grouped, n - trivial);
         let unstable = others.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
+        // The iteration may not converge where multipliers are hundreds of orders of magnitude apart.
+        let Some(others) = others else { return explicit::multipliers(course, scale, true) };
         let mut multipliers = vec![Complex64::new(sign * log.exp(), 0.0); trivial];
-        match others {
-            Some(found) => multipliers.extend(found.into_iter().map(|e| e.value())),
-            None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - trivial]),
-        }
+        multipliers.extend(others.into_iter().map(|e| e.value()));
         Floquet { multipliers, unstable, log_product: log + log_others }
     }))
 }
