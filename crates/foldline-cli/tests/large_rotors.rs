@@ -17,7 +17,7 @@ const RADIUS: usize = 56;
 fn start(model: &str, seed: &str) -> Point {
     let text = format!(
         "model = \"m\"\ntolerance = 1e-6\n[[seed]]\nname = \"s\"\n{seed}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\n\
-         range = [\"1000 rpm\", \"9000 rpm\"]\nmax-points = 1\n"
+         range = [\"100 rpm\", \"9000 rpm\"]\nmax-points = 1\n"
     );
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
     let diagram =

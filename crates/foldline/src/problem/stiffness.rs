@@ -22,10 +22,6 @@ use crate::stability::eigenvalues;
 /// z beyond which modes are fast. Empirical: the longest intervals of adapted meshes decay a few times as much as the
 /// average, so that at most 1e-11 of a mode is left there. The error estimate of multipliers at Gauss points inverts that.
 const FAST: f64 = 10.0;
-/// Share of [`GROWTH`] up to which Radau points are chosen for a cycle at Gauss points. Empirical: the next meshes have
-/// intervals of up to twice to three times the length, on which they should not have to be given up again.
-const AHEAD: f64 = 0.25;
-
 /// Collocation points that suit a cycle, at most approximately known, with the given parameters of the model.
 pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle: &Cycle) -> Points {
     let (n, intervals) = (field.dim(), cycle.intervals());
@@ -60,13 +56,12 @@ pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle
         return Points::Gauss;
     }
     let (mut decay, mut unresolved) = (0.0, false);
-    let most = GROWTH * if cycle.points == Points::Radau { 1.0 } else { AHEAD };
     for j in 0..intervals {
         let h = cycle.mesh[j + 1] - cycle.mesh[j];
         let jacobian: Vec<f64> = (0..n * n).map(|at| period * fx[at * intervals + j]).collect();
         let modes = eigenvalues(&jacobian, n, scales);
         decay += h * modes.iter().fold(0.0, |most: f64, z| most.max(-z.re));
-        unresolved |= modes.iter().any(|z| z.re.is_nan() || h * z.re > most);
+        unresolved |= modes.iter().any(|z| z.re.is_nan() || h * z.re > GROWTH);
     }
     let z = decay / intervals as f64;
     match cycle.points {
