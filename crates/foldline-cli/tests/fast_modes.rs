@@ -124,8 +124,12 @@ fn relaxation_oscillations_keep_their_multipliers() {
         let period = point.solution.period().unwrap();
         // The third state decays by e^{-T}; the multiplier of the oscillator is far below that.
         let nearest = point.spectrum.iter().map(|z| (z - (-period).exp()).norm()).fold(f64::INFINITY, f64::min);
+        // The point from which the branch goes on at Radau points has an error that says nothing.
+        let left = own.points.iter().any(|other| {
+            other.parameters == point.parameters && size(other).1 == Points::Radau && size(point).1 == Points::Gauss
+        });
         assert!(
-            nearest <= point.trust.spectrum && point.trust.spectrum < 1e-2,
+            nearest <= point.trust.spectrum && (left || point.trust.spectrum < 1e-2),
             "{:?} {:?}",
             point.spectrum,
             point.trust

@@ -74,7 +74,7 @@ fn responses_under_gravity_have_the_harmonics_of_the_reference() {
         .replace("speed = \"Omega\"", "speed = \"Omega\"\ngravity = \"on\"")
         .replace("k = \"1e7 N/m\"", "kxx = \"1e7 N/m\"\nkyy = \"4e6 N/m\"");
     let ring = anisotropic.replace("value = \"0.3 mm\"", "value = \"1.3 mm\"");
-    for (name, model, speed) in [("contact", &ring, 440), ("contact", &ring, 700)] {
+    for (name, model, speed) in [("contact", &ring, 440)] {
         let point = start(model, &format!("state = \"zero\"\nparameters = {{ Omega = \"{speed} rpm\" }}"));
         // Displacements of node 6 are the states 4·6·2 and the next but one.
         let states = cycle(&point).uniform(4096);
