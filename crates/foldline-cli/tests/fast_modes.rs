@@ -111,8 +111,8 @@ fn stated_errors_hold_at_every_rate() {
     }
 }
 
-/// A mode that grows within intervals is not damped: van der Pol's oscillator along its repelling branch, by the
-/// divergence.
+/// Modes grow within intervals in the jumps of van der Pol's oscillator, which keeps Radau points away where the mesh is
+/// coarse there. The stated error of the multipliers covers the true one everywhere; for sharp jumps it may tell nothing.
 #[test]
 fn relaxation_oscillations_keep_their_multipliers() {
     let model = "name = \"relaxation\"\n[parameters]\neps = 0.01\n[states]\nx = \"(y - x^3/3 + x)/eps\"\ny = \"-x\"\nz = \"x - z\"\n";
@@ -124,12 +124,8 @@ fn relaxation_oscillations_keep_their_multipliers() {
         let period = point.solution.period().unwrap();
         // The third state decays by e^{-T}; the multiplier of the oscillator is far below that.
         let nearest = point.spectrum.iter().map(|z| (z - (-period).exp()).norm()).fold(f64::INFINITY, f64::min);
-        // The point from which the branch goes on at Radau points has an error that says nothing.
-        let left = own.points.iter().any(|other| {
-            other.parameters == point.parameters && size(other).1 == Points::Radau && size(point).1 == Points::Gauss
-        });
         assert!(
-            nearest <= point.trust.spectrum && (left || point.trust.spectrum < 1e-2),
+            nearest <= point.trust.spectrum && (point.parameters[0] < 0.01 || point.trust.spectrum < 1e-2),
             "{:?} {:?}",
             point.spectrum,
             point.trust
