@@ -1,7 +1,10 @@
 //! Connecting orbits: against separate computations, through the command.
 
+use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind};
+use foldline::explore::{self, System};
 use foldline_store::run_file::{Part, load_part};
+use foldline_store::study_file::parse_study;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -157,8 +160,15 @@ fn a_stopped_curve_goes_on_to_the_same_end() {
     let (whole, _) = desk("lorenz", &lorenz());
     let (expected, _) = run(whole.path(), 0);
     let (folder, _) = desk("lorenz", &lorenz().replace("[8.5, 12.5]", "[8.5, 12.5]\nmax-points = 4"));
-    let (short, _) = run(folder.path(), 3);
+    let (mut short, _) = run(folder.path(), 3);
     assert!(short.branch("orbits").unwrap().points.len() < expected.branch("orbits").unwrap().points.len());
+    let curve = short.branches.iter_mut().find(|branch| branch.name == "orbits").unwrap();
+    curve.ends = [None, None];
+    let whole_study = format!("model = \"m\"\ntolerance = 1e-8\n{}", lorenz());
+    let study = parse_study(&whole_study, "study", &model("lorenz"), "model").unwrap();
+    let again = explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, short, &Unobserved);
+    agrees("lorenz", &again, 3);
+    complete(again.branch("orbits").unwrap());
     let table = foldline(folder.path(), &["table", "run", "--points", "--branch", "orbits"]);
     assert!(text(&table).contains("saddle_quantity"), "{}", text(&table));
 }

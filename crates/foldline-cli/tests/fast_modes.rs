@@ -83,6 +83,26 @@ fn a_mode_may_become_fast_along_a_branch() {
     assert!((last.solution.period().unwrap() - TAU).abs() < 1e-8 && last.trust.spectrum < 1e-7, "{:?}", last.trust);
 }
 
+/// A `stop` holds where the collocation points would change, too.
+#[test]
+fn a_branch_ends_at_its_stop_where_the_points_would_change() {
+    let study = |more: &str| {
+        format!(
+            "[[seed]]\nname = \"s\"\nstate = {{ x = 1, y = 0, z = 1 }}\nparameters = {{ mu = 1 }}\n[[branch]]\n\
+             name = \"b\"\nfrom = \"s\"\nfree = \"k\"\nrange = [1, 9]\n{more}"
+        )
+    };
+    let whole = run(&slaved("10^k"), &study(""));
+    let points = &branch(&whole, "b").points;
+    // The change happens at the last point at Gauss points.
+    let at = points.iter().rfind(|point| size(point).1 == Points::Gauss).unwrap().parameters[1];
+    let stopped = run(&slaved("10^k"), &study(&format!("stop = {{ k = {at} }}\n")));
+    let own = branch(&stopped, "b");
+    assert!(matches!(own.ends[1], Some(Ending::Asked(_))), "{:?}", own.ends);
+    let last = own.points.last().unwrap();
+    assert!((last.parameters[1] - at).abs() < 1e-9 && size(last).1 == Points::Gauss, "{at}: {:?}", last.parameters);
+}
+
 /// x = e^{sin t} at every rate; the Prothero–Robinson problem. The stated error covers the true one, which it exceeds by
 /// no more than a few orders of magnitude.
 #[test]

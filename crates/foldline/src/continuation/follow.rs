@@ -36,7 +36,7 @@ pub struct Follow<'w> {
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
-    /// The end of the branch at a point where its direction jumps, if a point is next to one.
+    /// The end of the run at a point beyond which another problem or another direction is needed.
     pub corner: &'w dyn Fn(&Point) -> Option<Ending>,
     /// True if the problem holds a branch of a switched field, so that equilibria are followed through its surfaces.
     pub holds: bool,

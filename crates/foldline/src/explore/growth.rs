@@ -612,6 +612,15 @@ impl Growth<'_> {
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let (connecting, line) = (branch.is_connecting(), self.line(branch));
         let at_axis = |at: &Point| limit::reached(at).filter(|_| connecting);
+        let next_points: RefCell<Option<Points>> = RefCell::default();
+        let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
+        // Asked only where the branch has not ended, so that a change of the points hides no end.
+        let at_change = |at: &Point| {
+            let better = may_change.get().then(|| repointed::better(self.system, at)).flatten();
+            next_points.replace(better);
+            better.map(|_| Ending::Stopped)
+        };
+        let turned = |at: &Point| corner::limit(system.field, at, free).filter(|_| corners);
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -619,7 +628,7 @@ impl Growth<'_> {
             marks: &marks,
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
-            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners).or_else(|| at_axis(at)),
+            corner: &|at| turned(at).or_else(|| at_axis(at)).or_else(|| at_change(at)),
             direction,
             symmetric,
             holds,
@@ -636,8 +645,6 @@ impl Growth<'_> {
         let record = RefCell::new(Record::at(&last, side == 1));
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
-        let next_points: RefCell<Option<Points>> = RefCell::default();
-        let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
@@ -679,11 +686,7 @@ impl Growth<'_> {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
-                    let better = may_change.get().then(|| repointed::better(self.system, &point)).flatten();
-                    next_points.replace(better);
-                    before.is_none_or(|before| self.unexplained(branch, before, &point))
-                        && self.accept(branch, point)
-                        && better.is_none()
+                    before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }

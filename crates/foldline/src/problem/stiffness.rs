@@ -22,6 +22,7 @@ use crate::stability::eigenvalues;
 /// z beyond which modes are fast. Empirical: the longest intervals of adapted meshes decay a few times as much as the
 /// average, so that at most 1e-11 of a mode is left there. The error estimate of multipliers at Gauss points inverts that.
 const FAST: f64 = 10.0;
+
 /// Collocation points that suit a cycle, at most approximately known, with the given parameters of the model.
 pub fn suited(field: &dyn VectorField, scales: &[f64], parameters: &[f64], cycle: &Cycle) -> Points {
     let (n, intervals) = (field.dim(), cycle.intervals());
