@@ -56,7 +56,7 @@ fn bouncing_cycles_are_found_from_the_ratio_alone() {
     let known = reference(include_str!("reference/fe_bouncing.csv"));
     let point = start(MODEL, "attractor = \"2:1\"\nparameters = { Omega = \"4400 rpm\" }");
     let of = |what: &str| known[format!("SL4400s-{what}").as_str()];
-    near(point.solution.period().unwrap() / of("T"), 1.0, 2e-5);
+    near(point.solution.period().unwrap() / of("T"), 1.0, 1e-8);
     near(point.ranges[RADIUS][1] / CLEARANCE / of("rmax"), 1.0, 1e-4);
     near(point.ranges[RADIUS][0] / CLEARANCE, of("rmin"), 2e-4);
     let leading = point.free_spectrum().iter().map(|z| z.norm()).fold(0.0, f64::max);
