@@ -11,7 +11,7 @@ use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
 use foldline_plot::Picture;
-use foldline_store::order::{names, ordered};
+use foldline_store::order::ordered;
 use foldline_store::run_file::{Recorder, forget_stop, is_asked_to_stop};
 use foldline_store::study_file::{Study, read_study};
 use std::io::{Write, stderr, stdout};
@@ -130,7 +130,7 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
         watch.recorder.complete()?
     }
 
-    let diagram = ordered(diagram, &names(&study.plan));
+    let diagram = ordered(diagram, &study.plan);
     match conversion(&study.model, way.units)? {
         Some(conversion) => print_special(&conversion.diagram(diagram.clone()), conversion.model())?,
         None => print_special(&diagram, &study.model)?,

@@ -10,7 +10,7 @@ use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
 use foldline::special::quantity::Quantity;
-use foldline_store::order::{leg, names, ordered};
+use foldline_store::order::{leg, ordered};
 use foldline_store::run_file::load;
 use foldline_store::short;
 use foldline_store::study_file::{self, parse_study_of_run};
@@ -35,7 +35,7 @@ pub struct Diagram {
 impl Diagram {
     /// Returns the diagram with its branches in the order of the study.
     pub fn new(diagram: diagram::Diagram, study: Arc<study_file::Study>, notes: Vec<(String, String)>) -> Diagram {
-        let diagram = Arc::new(ordered(diagram, &names(&study.plan)));
+        let diagram = Arc::new(ordered(diagram, &study.plan));
         Diagram { diagram, study, notes, converted: false }
     }
 

@@ -13,7 +13,7 @@ use crate::publication::{Publication, StudyPlan};
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Kind, Point, Responses, SpecialPoint};
 use foldline::explore::{self, Plan, System, growth, known};
-use foldline_store::order::{names, ordered};
+use foldline_store::order::ordered;
 use foldline_store::run_file::{Recorded, Recorder, RunFileError, load};
 use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study};
@@ -254,7 +254,7 @@ const FINISHED: &str = "finished";
 
 fn whole(study: Study, diagram: Diagram, notes: Vec<(String, String)>, seconds: f64, reused: bool) -> Run {
     let short = short::lines(&diagram, &study.plan, &study.model);
-    let diagram = ordered(diagram, &names(&study.plan));
+    let diagram = ordered(diagram, &study.plan);
     Run { study, diagram, seconds, reused, short, notes }
 }
 

@@ -1,4 +1,4 @@
-//! Order in which branches are listed.
+//! Order in which branches, surveys and sweeps are listed.
 
 use foldline::diagram::{Branch, Diagram, Origin};
 use foldline::explore::{Near, Plan, Start};
@@ -53,12 +53,19 @@ fn is_finding(name: &str, exploration: &str) -> bool {
         .is_some_and(|(kind, number)| !kind.contains('/') && number.parse::<usize>().is_ok())
 }
 
-/// Sorts the branches of a diagram into an order that does not depend on the scheduling of the threads.
+/// Sorts the branches and responses of a diagram into an order that does not depend on the scheduling of the threads.
 ///
 /// The branches of the study come in the order of its [`names`]. Each is followed by its child branches, sorted by
 /// parameter, and then by the two-parameter curves that begin on it. Homotopy runs and findings of an exploration stay
-/// in the order in which they were computed.
-pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
+/// in the order in which they were computed. Surveys and then sweeps come in the order of the study.
+pub fn ordered(diagram: Diagram, plan: &Plan) -> Diagram {
+    let simulated = || plan.surveys.iter().map(|own| &own.name).chain(plan.sweeps.iter().map(|own| &own.name));
+    let mut diagram = branches_ordered(diagram, &names(plan));
+    diagram.responses.sort_by_key(|set| simulated().position(|name| *name == set.name).unwrap_or(usize::MAX));
+    diagram
+}
+
+fn branches_ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
     let legs =
         |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
     let parent = |branch: &Branch| match &branch.origin {
@@ -109,7 +116,7 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use foldline::diagram::{Family, Kind};
+    use foldline::diagram::{Family, Kind, Responses, Search};
 
     fn from(parent: &str, name: &str, parameter: f64) -> Branch {
         let origin = Origin::Switch { parent: parent.into(), kind: Kind::PeriodDoubling, parameter };
@@ -132,7 +139,8 @@ mod tests {
             let mut shuffled = branches.to_vec();
             shuffled.rotate_left(shift);
             shuffled.swap(0, 3);
-            let sorted = ordered(Diagram { branches: shuffled, ..Diagram::default() }, &["a".into(), "b".into()]);
+            let sorted =
+                branches_ordered(Diagram { branches: shuffled, ..Diagram::default() }, &["a".into(), "b".into()]);
             assert_eq!(sorted.branches.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), expected);
         }
     }
@@ -158,7 +166,7 @@ mod tests {
             let mut shuffled = branches.to_vec();
             shuffled.rotate_left(shift);
             shuffled.swap(1, 4);
-            let sorted = ordered(Diagram { branches: shuffled, ..Diagram::default() }, &study);
+            let sorted = branches_ordered(Diagram { branches: shuffled, ..Diagram::default() }, &study);
             let names: Vec<&str> = sorted.branches.iter().map(|b| b.name.as_str()).collect();
             assert_eq!(names, branches.each_ref().map(|b| b.name.as_str()));
         }
@@ -172,13 +180,36 @@ mod tests {
         branches[1] = from("all/equilibrium-1", "all/equilibrium-1/hopf-1", 1.0);
         let last = branches.remove(1);
         branches.push(last);
-        let sorted = ordered(Diagram { branches, ..Diagram::default() }, &["all".into()]);
+        let sorted = branches_ordered(Diagram { branches, ..Diagram::default() }, &["all".into()]);
         assert_eq!(sorted.branches.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), names);
+    }
+
+    #[test]
+    fn surveys_and_sweeps_come_in_the_order_of_the_study() {
+        let model = "state = [\"x\"]\n[parameters]\np = 1\n[equations]\n\"x'\" = \"p - x\"\n";
+        let search = |kind: &str, name: &str| format!("[[{kind}]]\nname = \"{name}\"\nfree = \"p\"\nvalues = [1, 2]\n");
+        let from = "from = \"rest\"\n";
+        let text = [
+            "model = \"m.toml\"\n[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\n".to_string(),
+            search("survey", "wide") + "starts = 1\n",
+            search("sweep", "up") + from,
+            search("sweep", "down") + from,
+        ];
+        let plan = crate::study_file::parse_study(&text.concat(), "s.toml", model, "m.toml").unwrap().plan;
+        let set = |name: &str| Responses { name: name.into(), search: Search::Sweep, free: 0, responses: Vec::new() };
+        for names in [["up", "wide", "down"], ["down", "up", "wide"]] {
+            let diagram = Diagram { responses: names.map(set).to_vec(), ..Diagram::default() };
+            let sorted = ordered(diagram, &plan);
+            assert_eq!(
+                sorted.responses.iter().map(|set| set.name.as_str()).collect::<Vec<_>>(),
+                ["wide", "up", "down"]
+            );
+        }
     }
 
     #[test]
     fn branches_that_are_parents_of_each_other_are_listed() {
         let diagram = Diagram { branches: vec![from("b", "a", 0.0), from("a", "b", 0.0)], ..Diagram::default() };
-        assert_eq!(ordered(diagram, &[]).branches.len(), 2);
+        assert_eq!(branches_ordered(diagram, &[]).branches.len(), 2);
     }
 }

@@ -75,7 +75,7 @@ pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[
     let numbers: HashMap<&str, i64> = spans.iter().map(|span| (span.name.as_str(), span.number)).collect();
     let reach: HashMap<i64, [i64; 2]> = spans.iter().filter_map(|span| Some((span.number, span.reach?))).collect();
     let planned = names(&study.plan);
-    let diagram = ordered(run.diagram, &planned);
+    let diagram = ordered(run.diagram, &study.plan);
     let plan = &study.plan;
     // The branches of homotopies and explorations are not known beforehand.
     let single = |name: &&String| {

@@ -16,7 +16,7 @@ use foldline::explore::plan::Plan;
 use foldline::model::{Model, Spread};
 use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
-use foldline_store::order::{leg, names, ordered};
+use foldline_store::order::{leg, ordered};
 use foldline_store::run_file::{Part, load_part};
 use foldline_store::short;
 use foldline_store::study_file::parse_study_of_run;
@@ -202,7 +202,7 @@ pub struct Run {
 pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let run = load_part(folder, part)?;
     let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
-    let diagram = ordered(run.diagram, &names(&study.plan));
+    let diagram = ordered(run.diagram, &study.plan);
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
     let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
     let mut notes = run.notes;

@@ -17,7 +17,7 @@ mod parquet;
 mod tables;
 
 use crate::diagnostic::Diagnostic;
-use crate::order::{names, ordered};
+use crate::order::ordered;
 use crate::run_file::{Part, Reading, RunFileError};
 use crate::study_file::{Study, parse_study_of_run};
 use foldline::contract::VectorField;
@@ -100,7 +100,7 @@ impl Export {
         let run = reading.recorded(Part::Special)?;
         let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
         let study = study.map_err(ExportError::Study)?;
-        let diagram = ordered(run.diagram, &names(&study.plan));
+        let diagram = ordered(run.diagram, &study.plan);
         Ok(Export { reading, study, conversion: None, diagram, profiles: true, sensitivities: None })
     }
 
