@@ -401,3 +401,56 @@ fn arguments_of_explore_are_checked() {
     assert_eq!(own.stdout, other.stdout);
     assert!(String::from_utf8_lossy(&own.stdout).contains("pendulum/equilibrium-1"));
 }
+
+#[test]
+fn a_misnamed_table_is_the_only_mistake_reported() {
+    let desk = Desk::new();
+    for (word, hint) in [("params", "did you mean `parameters`?"), ("settings", "the key for this is `parameters`")] {
+        let message = desk.model("[parameters]", &format!("[{word}]"));
+        says(&message, &["pendulum.toml:4:2", &format!("unknown key `{word}` in the model"), hint]);
+        assert_eq!(message.matches("error:").count(), 1, "{message}");
+    }
+}
+
+#[test]
+fn words_of_other_programs_lead_to_the_key_that_is_meant() {
+    let desk = Desk::new();
+    says(&desk.study("free = \"mu\"", "vary = \"mu\""), &["unknown key `vary`", "the key for this is `free`"]);
+    says(&desk.study("from = \"rest\"", "start = \"rest\""), &["unknown key `start`", "the key for this is `from`"]);
+    says(
+        &desk.study("[[branch]]", "[[continuation]]"),
+        &["unknown key `continuation`", "the key for this is `branch`"],
+    );
+}
+
+#[test]
+fn a_key_of_a_study_in_a_model_is_told_its_place() {
+    let desk = Desk::new();
+    let range = desk.model("mu = 0.5", "mu = { value = 0.5, range = [0, 1] }");
+    says(&range, &["unknown key `range` in the parameter `mu`", "belong to the study", "[[branch]]"]);
+    desk.write("named.toml", "model = \"decay\"\n[states]\nx = 1\n[equations]\n\"x'\" = \"-x\"\n");
+    let named = desk.refused(&["check", "named.toml"]);
+    says(&named, &["named.toml:1:1", "unknown key `model` in the model", "a model is called by its `name`"]);
+}
+
+#[test]
+fn a_function_without_brackets_and_a_key_without_quotes_are_recognised() {
+    let desk = Desk::new();
+    says(&desk.model("\"hypot(x, y)\"", "\"sin x\""), &["an operator is missing", "`sin(…)`"]);
+    let key = desk.model("[outputs]", "[equations]\nx' = \"y\"\n[outputs]");
+    says(&key, &["write the name in quotes: `\"x'\" = …`"]);
+}
+
+#[test]
+fn a_list_of_states_and_the_notations_of_a_derivative_are_recognised() {
+    let desk = Desk::new();
+    desk.write("list.toml", "states = [\"x\", \"v\"]\n[equations]\nx = \"v\"\nv = \"-x\"\n");
+    let list = desk.refused(&["check", "list.toml"]);
+    says(&list, &["list.toml:1:10", "`states` is a list, not a table", "`[states]`"]);
+    assert_eq!(list.matches("error:").count(), 1, "{list}");
+    for name in ["x'", "dx/dt", "dxdt", "dx_dt", "xdot", "x_dot", "dx"] {
+        desk.write("rate.toml", &format!("[states]\nx = 1\n[equations]\n\"{name}\" = \"-x\"\n"));
+        let rate = desk.refused(&["check", "rate.toml"]);
+        says(&rate, &["rate.toml:4:1", "the rate of change of `x` is written `x = \"…\"`"]);
+    }
+}

@@ -7,6 +7,7 @@
 
 pub mod auto;
 pub mod diagnostic;
+mod elsewhere;
 pub mod export;
 pub mod finite;
 pub mod model_file;

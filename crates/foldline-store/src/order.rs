@@ -186,7 +186,7 @@ mod tests {
 
     #[test]
     fn surveys_and_sweeps_come_in_the_order_of_the_study() {
-        let model = "state = [\"x\"]\n[parameters]\np = 1\n[equations]\n\"x'\" = \"p - x\"\n";
+        let model = "[parameters]\np = 1\n[states]\nx = \"p - x\"\n";
         let search = |kind: &str, name: &str| format!("[[{kind}]]\nname = \"{name}\"\nfree = \"p\"\nvalues = [1, 2]\n");
         let from = "from = \"rest\"\n";
         let text = [

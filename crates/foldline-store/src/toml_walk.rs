@@ -1,7 +1,8 @@
 //! Traversal of a TOML text that collects every mistake with its position.
 
 use crate::diagnostic::Diagnostic;
-use crate::nearest::suggest;
+use crate::elsewhere::{belongs, meant};
+use crate::nearest::{nearest, suggest};
 use foldline::model::unsupported;
 use foldline::units::{self, Unit};
 use std::io::Read;
@@ -36,7 +37,10 @@ impl<'t> Walk<'t> {
             Ok(table) => Ok((walk, table.into_inner())),
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
-                walk.report(span, error.message(), "the file must be TOML: `key = value`, `[table]`, `[[list]]`");
+                let hint = unquoted(text, &span).unwrap_or_else(|| {
+                    "the file must be TOML: `key = value`, `[table]`, `[[list]]`; texts stand in quotes".to_string()
+                });
+                walk.report(span, error.message(), hint);
                 Err(walk.found)
             }
         }
@@ -50,18 +54,28 @@ impl<'t> Walk<'t> {
         self.found.push(diagnose(self.file, self.text, span, message.into(), hint.into()));
     }
 
-    /// Reports every key of `table` that is not among `known`.
-    pub(crate) fn only(&mut self, table: &DeTable, known: &[&str], whose: &str) {
+    /// Reports every key of `table` that is not among `known`. Returns those of `known` that are meant instead.
+    pub(crate) fn only<'k>(&mut self, table: &DeTable, known: &[&'k str], whose: &str) -> Vec<&'k str> {
+        let mut missing = Vec::new();
         for key in table.keys() {
             let name: &str = key.get_ref();
             if known.contains(&name) {
                 continue;
             }
-            match unsupported(name) {
-                Some(kind) => self.report(key.span(), format!("`{name}` in {whose}: {}", kind.message), kind.instead),
-                None => self.report(key.span(), format!("unknown key `{name}` in {whose}"), suggest(name, known)),
-            }
+            let spelt = nearest(name, known.iter().copied());
+            let instead = spelt.or_else(|| meant(name, known)).filter(|own| !table.contains_key(*own));
+            let (message, hint) = match (belongs(name, whose), unsupported(name), instead) {
+                (Some(place), ..) => (format!("unknown key `{name}` in {whose}"), place.to_string()),
+                (_, Some(kind), _) => (format!("`{name}` in {whose}: {}", kind.message), kind.instead.to_string()),
+                (.., Some(key)) if spelt.is_none() => {
+                    (format!("unknown key `{name}` in {whose}"), format!("the key for this is `{key}`"))
+                }
+                _ => (format!("unknown key `{name}` in {whose}"), suggest(name, known)),
+            };
+            self.report(key.span(), message, hint);
+            missing.extend(instead);
         }
+        missing
     }
 
     /// Reads a finite number, integer or decimal.
@@ -207,6 +221,15 @@ impl<'t> Walk<'t> {
             format!("write {wanted}"),
         );
     }
+}
+
+/// Hint for a line whose key has a mark that TOML accepts only in quotes, such as `x' = "v"`.
+fn unquoted(text: &str, span: &Range<usize>) -> Option<String> {
+    let begin = text.get(..span.start)?.rfind('\n').map_or(0, |end| end + 1);
+    let line = text.get(begin..)?.lines().next()?;
+    let key = line.split_once('=')?.0.trim();
+    let marked = key.ends_with(['\'', ']', ')']) && !key.starts_with(['"', '\'', '[', '{']);
+    marked.then(|| format!("write the name in quotes: `\"{key}\" = …`"))
 }
 
 /// The noun with its indefinite article: `a table`, `an array`.

@@ -79,7 +79,14 @@ fn test() -> bool {
         scope.spawn(cargo_deny);
         // A failure is reported where the environment is used.
         let _ = environments.join();
-        cargo(&[&tests[..], &["--no-fail-fast"]].concat()) && page::test() && python::test()
+        // Side by side, because many programs of the Rust tests end with one long test on one core.
+        let others = scope.spawn(|| [("page", page::test_built()), ("Python package", python::test())]);
+        let own = cargo(&[&tests[..], &["--no-fail-fast"]].concat());
+        let others = others.join().unwrap_or([("others", false); 2]);
+        let verdicts = std::iter::once(("Rust code", own)).chain(others);
+        let failed: Vec<&str> = verdicts.filter(|(_, passed)| !passed).map(|(what, _)| what).collect();
+        failed.iter().for_each(|what| eprintln!("the tests of the {what} have failed, see above"));
+        failed.is_empty()
     }) && deny()
 }
 

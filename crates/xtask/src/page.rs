@@ -10,9 +10,15 @@ const TESTS: &str = "crates/foldline-view/tests/page";
 /// Oldest version of Node.js with the test runner that is used.
 const NODE: u32 = 20;
 
-/// Runs the tests under `target/page`, where their only dependency is installed. Without Node.js, npm, a browser or a
-/// package registry, a message says that the page was not tested.
+/// Builds the program and tests its page.
 pub fn test() -> bool {
+    cargo(&["build", "--quiet", "--package", "foldline-cli"]) && test_built()
+}
+
+/// Tests the page of the program that the build of the tests has left. Its tests run under `target/page`, where their
+/// only dependency is installed. Without Node.js, npm, a browser or a package registry, a message says that the page was
+/// not tested.
+pub fn test_built() -> bool {
     let Some(browser) = browser() else {
         eprintln!("the page NOT tested: there is no Chromium; CHROMIUM=PATH names one");
         return true;
@@ -37,7 +43,7 @@ pub fn test() -> bool {
     let mut node = Command::new("node");
     node.current_dir(&folder).args(["--test", "--test-concurrency=1", "--test-reporter=dot"]);
     node.env("FOLDLINE", program).env("ROOT", root()).env("BROWSER", browser);
-    cargo(&["build", "--quiet", "--package", "foldline-cli"]) && run(&mut node)
+    run(&mut node)
 }
 
 /// Program of Chromium itself: a wrapper of a distribution may add options for a graphics processor.

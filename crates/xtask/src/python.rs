@@ -28,8 +28,8 @@ pub fn test() -> bool {
     let wheels = home.join("wheels");
     // Removes the wheels of an earlier call.
     let _ = std::fs::remove_dir_all(&wheels);
-    let build = [OsStr::new("build"), "--quiet".as_ref(), "--out".as_ref(), wheels.as_ref()];
-    environment.runs("maturin", build)
+    let build = ["build", "--quiet", "--features", "workspace", "--out"].map(OsStr::new);
+    environment.runs("maturin", build.into_iter().chain([wheels.as_os_str()]))
         && wheel(&wheels).is_some_and(|wheel| {
             let install = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"].map(OsStr::new);
             environment.runs("python", install.into_iter().chain([wheel.as_os_str()]))

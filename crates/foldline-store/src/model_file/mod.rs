@@ -103,7 +103,7 @@ pub(crate) fn parse_model_of_run(text: &str, file: &str) -> Result<Model, Vec<Di
 
 fn parse(text: &str, file: &str, refuse_units: bool) -> Result<(Model, Option<rotor::Read>), Vec<Diagnostic>> {
     let (mut walk, root) = Walk::parse(text, file)?;
-    if let Some(named) = root.get("model") {
+    if let Some(named) = root.get("model").filter(|_| !root.contains_key("equations")) {
         let message = "this file is a study, not a model";
         let model = named.get_ref().as_str().map_or(String::new(), |model| format!("; its model is `{model}`"));
         walk.report(named.span(), message, format!("run it with `foldline run {file}`{model}"));
@@ -170,7 +170,8 @@ impl<'t> Reader<'t> {
 
 impl Reader<'_> {
     fn source(&mut self, root: &DeTable, file: &str) -> ModelSource {
-        self.walk.only(root, &ROOT_KEYS, "the model");
+        // Without a table, everything that refers to it would be reported as well.
+        self.incomplete |= !self.walk.only(root, &ROOT_KEYS, "the model").is_empty();
         let stem = Path::new(file).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         let mut source = ModelSource {
             name: root.get("name").and_then(|v| self.walk.string(v, "`name`")).unwrap_or(stem),
@@ -243,7 +244,16 @@ impl Reader<'_> {
     }
 
     fn entries<'v, 't>(&mut self, root: &'v DeTable<'t>, key: &str) -> Entries<'v, 't> {
-        let table = root.get(key).and_then(|value| self.walk.table(value, &format!("`{key}`")));
+        let table = root.get(key).and_then(|value| match value.get_ref() {
+            DeValue::Array(_) if key == "states" => {
+                let hint = "write a table with the equation of each state: `[states]`, then lines such as `x = \"-y\"`";
+                self.walk.report(value.span(), "`states` is a list, not a table", hint);
+                None
+            }
+            _ => self.walk.table(value, &format!("`{key}`")),
+        });
+        // Without a table, everything that refers to it would be reported as well.
+        self.incomplete |= root.contains_key(key) && table.is_none();
         let mut entries: Entries =
             table.into_iter().flat_map(|t| t.iter()).map(|(k, v)| (k.get_ref().to_string(), k.span(), v)).collect();
         entries.sort_by_key(|(_, place, _)| place.start);

@@ -195,9 +195,12 @@ fn with_settings(text: &str, settings: &[(&str, String)]) -> String {
     format!("{lines}{text}")
 }
 
-/// True if a text is a study rather than a model: it names a model or something to compute.
+/// True if a text is a study rather than a model: it has no equations and names a model or something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
+    if root.get_ref().contains_key("equations") {
+        return false;
+    }
     let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep"];
     keys.iter().any(|key| root.get_ref().contains_key(*key))
 }

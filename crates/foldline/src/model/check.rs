@@ -306,17 +306,21 @@ impl<'a> Check<'a> {
             match place.get(equation.name.as_str()).copied() {
                 None => {
                     let message = format!("an equation for `{}`, which is not a declared state", equation.name);
-                    let hint = match equation.name.strip_suffix('\'') {
-                        Some(state) => {
+                    let state = derivative_of(&equation.name).filter(|state| place.contains_key(state));
+                    let hint = match (state, equation.name.strip_suffix('\'')) {
+                        (Some(state), _) => format!("the rate of change of `{state}` is written `{state} = \"…\"`"),
+                        (_, Some(state)) => {
                             format!("an acceleration declares its state: write `\"{state}''\" = \"…\"` under [states]")
                         }
-                        None => suggest(&equation.name, &states),
+                        _ => suggest(&equation.name, &states),
                     };
                     self.report(Item::Equation(i), Field::Name, message, hint);
                 }
                 Some(state) if equation_of[state].is_some() => {
                     let message = format!("a second equation for the state `{}`", equation.name);
-                    self.report(Item::Equation(i), Field::Name, message, "keep one of the two");
+                    let hint =
+                        "keep one of the two; under [states] too, `name = …` is an equation, not an initial value";
+                    self.report(Item::Equation(i), Field::Name, message, hint);
                 }
                 Some(state) => equation_of[state] = Some(i),
             }
@@ -369,4 +373,15 @@ pub(super) fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::Event(i) => &source.events[i].name,
         Item::Whirl | Item::Forcing | Item::Solve => "",
     }
+}
+
+/// Name of the state whose derivative a name denotes in one of the usual notations: `x'`, `dx/dt`, `dxdt`, `xdot`, `dx`.
+fn derivative_of(name: &str) -> Option<&str> {
+    let endings = ["'", "_dot", "dot"];
+    let ended = endings.iter().find_map(|ending| name.strip_suffix(ending));
+    let begun = || {
+        let rest = name.strip_prefix('d')?;
+        Some(["/dt", "_dt", "dt"].iter().find_map(|ending| rest.strip_suffix(ending)).unwrap_or(rest))
+    };
+    ended.or_else(begun).filter(|state| !state.is_empty())
 }

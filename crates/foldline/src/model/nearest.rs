@@ -1,7 +1,8 @@
 //! "Did you mean …?"
 
 /// Returns the candidate closest to `word` by edit distance, if close enough to be a likely misspelling. Ties go to the
-/// one closest in length, so that swapped letters rank before missing ones.
+/// one closest in length, so that swapped letters rank before missing ones. Otherwise the only candidate of which the
+/// word is an abbreviation: `params` for `parameters`.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = word.chars().count();
     if length > LONGEST {
@@ -9,15 +10,25 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     }
     // A single letter resembles every other.
     let allowed = if length < 2 { 0 } else { (length / 3).max(1) };
-    candidates
-        .into_iter()
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let close = candidates
+        .iter()
+        .copied()
         .filter(|candidate| candidate.chars().count().abs_diff(length) <= allowed)
         .map(|candidate| (distance(&folded(word), &folded(candidate)), candidate))
         .filter(|(d, _)| *d <= allowed)
         .min_by_key(|(d, candidate)| (*d, candidate.chars().count().abs_diff(length)))
-        .map(|(_, candidate)| candidate)
+        .map(|(_, candidate)| candidate);
+    close.or_else(|| {
+        let begin = folded(word);
+        let begin = begin.strip_suffix('s').unwrap_or(&begin);
+        let mut whole = candidates.into_iter().filter(|own| begin.len() >= SHORTEST && folded(own).starts_with(begin));
+        whole.next().filter(|_| whole.next().is_none())
+    })
 }
 
+/// Minimum number of letters of an abbreviation.
+const SHORTEST: usize = 3;
 /// Maximum number of candidates listed if none is close.
 const LISTED: usize = 24;
 /// Longer words are not compared letter by letter.
@@ -77,6 +88,14 @@ mod tests {
         assert_eq!(nearest("omega", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("tahn", ["tan", "tanh"]), Some("tanh"));
         assert_eq!(nearest("torque", ["kappa", "Omega"]), None);
+    }
+
+    #[test]
+    fn an_abbreviation_of_one_candidate_is_recognised() {
+        assert_eq!(nearest("params", ["range", "parameters", "forcing"]), Some("parameters"));
+        assert_eq!(nearest("eqs", ["equations", "forcing"]), None);
+        assert_eq!(nearest("par", ["parameters", "parts"]), None);
+        assert_eq!(nearest("p", ["parameters", "forcing"]), None);
     }
 
     #[test]

@@ -350,7 +350,13 @@ impl Parser<'_> {
                 "write a decimal point instead of a comma",
             ),
             Token::Number(_) | Token::Name(_) | Token::Symbol("(") if after_value => {
-                Complaint::new(span, "an operator is missing before this", "write `*` for a product")
+                let hint = match self.words.get(self.at.saturating_sub(1)) {
+                    Some((Token::Name(name), _)) if function(name).is_some() => {
+                        format!("write `*` for a product, or brackets around an argument: `{name}(…)`")
+                    }
+                    _ => "write `*` for a product".to_string(),
+                };
+                Complaint::new(span, "an operator is missing before this", hint)
             }
             Token::Symbol("[") => {
                 Complaint::new(span, "an index belongs to a name", "write it after the name, as in `x[i+1]`")
