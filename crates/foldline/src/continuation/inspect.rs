@@ -127,6 +127,8 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
+        // Multipliers of which no digit is known show no event.
+        let unresolved = self.settings.stability && [left, right].iter().any(|end| end.point.is_unresolved());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -136,6 +138,11 @@ impl Follow<'_> {
             let pitchfork = kind == Kind::BranchPoint
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             let without = match kind {
+                Kind::Fold | Kind::BranchPoint | Kind::PeriodDoubling | Kind::Torus
+                    if unresolved && (kind != Kind::Fold || fold_test != FoldTest::Slope) =>
+                {
+                    true
+                }
                 Kind::Fold => standing,
                 Kind::BranchPoint => fold_test != FoldTest::Slope && !conservative,
                 // Reciprocal pairs of multipliers have product 1 everywhere.
@@ -189,6 +196,9 @@ impl Follow<'_> {
             }
             match found {
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
+                    if passes_through(kind, [&left.point, &right.point], &found.station.point) {
+                        kind = Kind::BranchPoint;
+                    }
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
                 }
@@ -347,7 +357,7 @@ impl Follow<'_> {
         fold_test: FoldTest,
         cost: &mut Cost,
     ) -> Option<Vec<Found>> {
-        let ends = self.narrowed(stretch, right, cost);
+        let (whole, ends) = (right, self.narrowed(stretch, right, cost));
         let [left, right] = [&ends[0], &ends[1]];
         let error = discrepancy(
             self.settings,
@@ -375,6 +385,20 @@ impl Follow<'_> {
                 passed.push((kind, times, monitor.jump() as i64));
             }
         }
+        // Pairs that pass through 0 (1) itself belong to the null space.
+        let outer = [&stretch.left.point, &whole.point];
+        let at_zero: i64 = match passed.iter().position(|(kind, ..)| passes_through(*kind, outer, &right.point)) {
+            Some(index) => {
+                let (_, times, jump) = passed.swap_remove(index);
+                times * jump
+            }
+            None => 0,
+        };
+        if at_zero != 0 {
+            let own = passed.iter().position(|(kind, ..)| matches!(kind, Kind::BranchPoint | Kind::Fold));
+            let rest = own.map_or(0, |index| passed.swap_remove(index).1);
+            passed.push((Kind::BranchPoint, at_zero + rest, 1));
+        }
         if passed.is_empty() && turns && self.is_symmetric(&right.point) {
             return Some(self.fold_with_pitchfork(right, error));
         }
@@ -396,7 +420,11 @@ impl Follow<'_> {
             let (steps, change) =
                 if jump == 1 && kind == Kind::BranchPoint { (1, times) } else { (times.abs(), times.signum() * jump) };
             for _ in 0..steps {
-                out.push(Found::Special(self.special(kind, right.clone(), count, count + change, error)));
+                let mut special = self.special(kind, right.clone(), count, count + change, error);
+                if kind == Kind::PeriodDoubling && steps > 1 {
+                    special.remark = format!("the multiplier -1 has multiplicity {steps}");
+                }
+                out.push(Found::Special(special));
                 count += change;
             }
         }
@@ -613,6 +641,26 @@ impl Follow<'_> {
             bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
         })
     }
+}
+
+/// True if the pair located as a Hopf or torus point passes through 0 (multipliers: through 1) itself, so that the point
+/// is one with a null space of two dimensions: its distance from there is nothing beside that at the ends.
+fn passes_through(kind: Kind, ends: [&Point; 2], at: &Point) -> bool {
+    /// Share of the distance at an end: the accuracy of a located point, relative to a step, with a factor of safety.
+    const NOTHING: f64 = 1e-6;
+    let centre = match kind {
+        Kind::Hopf => 0.0,
+        Kind::Torus => 1.0,
+        _ => return false,
+    };
+    // The second closest, because a pair is meant.
+    let off = |point: &Point| {
+        let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
+        all.sort_by(f64::total_cmp);
+        all.get(1).copied()
+    };
+    let [Some(here), Some(before), Some(after)] = [off(at), off(ends[0]), off(ends[1])] else { return false };
+    here <= NOTHING * before.max(after)
 }
 
 /// True if the spectrum consists of multipliers.

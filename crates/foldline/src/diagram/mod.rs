@@ -215,6 +215,17 @@ impl Point {
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
+    /// True if it is not known on which side of the unit circle a multiplier lies, because no digit of it is known: near
+    /// orbits of infinite period and along canards, multipliers are so far apart that rounding decides.
+    pub fn is_unresolved(&self) -> bool {
+        /// Error, relative to the larger of 1 and the modulus, at which no digit is left.
+        const NONE: f64 = 1.0;
+        let error = self.trust.spectrum;
+        let of_cycle = matches!(self.solution, Solution::Cycle(_));
+        let may_pass = |z: &Complex64| (z.norm() - 1.0).abs() <= error * z.norm().max(1.0);
+        of_cycle && error >= NONE && self.free_spectrum().iter().any(may_pass)
+    }
+
     /// Distance from 1 within which a multiplier may be exactly 1.
     fn neutral_error(&self) -> f64 {
         /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less
@@ -970,6 +981,15 @@ impl Branch {
         let (first, last) = self.special.split_at(own.unwrap_or(self.special.len()));
         let earlier = if own.is_some() && special.point.position < 0 { last } else { first };
         earlier.iter().filter(same).count()
+    }
+
+    /// Number of special points of the same kind at exactly the same point, this one included: eigenvalues or multipliers
+    /// that cross simultaneously.
+    pub fn together_with(&self, special: &SpecialPoint) -> usize {
+        let same = |other: &&SpecialPoint| {
+            other.kind == special.kind && other.point.parameters == special.point.parameters
+        };
+        self.special.iter().filter(same).count().max(1)
     }
 
     /// Inserts a special point at its position.

@@ -637,6 +637,7 @@ impl Growth<'_> {
             first_period: branch.points.iter().min_by_key(|p| p.position.abs()).and_then(|p| p.solution.free_period()),
             homecoming: Homecoming::default(),
             inspected: 0.0,
+            known: None,
         };
         // A resumed run may already be on its way back to the start.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
@@ -646,6 +647,8 @@ impl Growth<'_> {
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
+        // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
+        let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -666,6 +669,8 @@ impl Growth<'_> {
                         let next = found.as_ref().map(|(_, next)| next);
                         self.tell_impacts(&system, branch, side, &mut special, next);
                         beyond.replace(found);
+                        let after = if side == 1 { special.unstable_after } else { special.unstable_before };
+                        grazed.replace(Some((special.point.parameters.clone(), after)));
                     }
                     self.tell_folds(&system, branch, &mut special);
                     if branch.family == Family::Arc {
@@ -679,11 +684,19 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    let misfit = record.borrow_mut().special(&plain);
+                    let counted = if special.kind == Kind::ImpactGrazing { &special } else { &plain };
+                    let misfit = record.borrow_mut().special(counted);
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
-                    latest.replace(point.clone());
+                    // The grazing cycle itself follows its special point and belongs to the far side.
+                    if let Some((_, after)) = grazed.take().filter(|(there, _)| *there == point.parameters) {
+                        point.unstable = after;
+                    }
+                    let before = latest.replace(point.clone());
+                    if recorded && point.is_unresolved() && !before.is_unresolved() && !self.unresolved(branch, &point) {
+                        return Verdict::Stop;
+                    }
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
@@ -723,7 +736,6 @@ impl Growth<'_> {
             let Some((mut problem, mut next)) = beyond.take() else { break };
             let position = there.position + if side == 1 { 1 } else { -1 };
             next.point.position = position;
-            record.replace(Record::at(&next.point, side == 1));
             let mut walk = Follow { holds: false, ..walk.on(&mut *problem) };
             ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
                 true => Ending::Stopped,
@@ -919,6 +931,12 @@ impl Growth<'_> {
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
             return Coefficients::none(format!("the null space has dimension {dimension}"));
+        }
+        if special.kind == Kind::PeriodDoubling && !special.remark.is_empty() {
+            return Coefficients::none(&special.remark);
+        }
+        if special.kind == Kind::Hopf && special::hopf::share_a_frequency(&special.point) {
+            return Coefficients::none("two pairs of eigenvalues cross with the same frequency");
         }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };
