@@ -10,9 +10,10 @@ use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, head_along, locate};
+use super::opposite::{Exchange, vanishing};
 use super::straddle::straddle;
 use crate::contract::Sight;
-use crate::diagram::{Cost, Kind, Point, STANDS, SpecialPoint};
+use crate::diagram::{Cost, Kind, NULL_SPACE, Point, STANDS, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -211,6 +212,20 @@ impl Follow<'_> {
                 Err(_) => lost = true,
             }
         }
+        let mut cut_there = None;
+        let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
+        if self.settings.stability && quiet && !unresolved && fold_test == FoldTest::Slope && depth < CLOSE {
+            match self.exchanged(&stretch, &right.point, history, cost) {
+                Some(Exchange::Apart(there)) => cut_there = Some(there),
+                Some(Exchange::Together(kind, found)) => {
+                    for _ in 0..if kind == Kind::PeriodDoubling { 2 } else { 1 } {
+                        located.push((kind, usize::from(kind == Kind::PeriodDoubling), found.clone()));
+                        others.push(None);
+                    }
+                }
+                None => {}
+            }
+        }
         // If both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed sign. That is
         // impossible along a branch: the step has cut across to another one with as many unstable multipliers.
         let above = |point: &Point| point.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > 1.0).count();
@@ -252,9 +267,9 @@ impl Follow<'_> {
         };
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
-        let mut seen = None;
+        let mut seen = cut_there;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
-        if depth == 0 && jumps.is_empty() && unknown {
+        if depth == 0 && jumps.is_empty() && unknown && seen.is_none() {
             seen = self.seen_between(&stretch, [&at_left, &at_right], history.is_none(), cost);
         }
         let suspicious = suspicious || seen.is_some();
@@ -301,6 +316,7 @@ impl Follow<'_> {
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
         let total = located.len();
+        let opposite = quiet && total == 2;
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
             while let Some(mark) = marks.next_if(|(_, mark, _)| mark.distance < found.distance) {
                 out.push(self.marked_there(mark, count));
@@ -308,7 +324,17 @@ impl Follow<'_> {
             let target = right.point.unstable as i64;
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
             let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
+            let null = match kind {
+                Kind::BranchPoint if self.settings.stability => vanishing([&left.point, &right.point], &found.station.point),
+                Kind::PeriodDoubling if opposite => 2,
+                _ => 1,
+            };
             let mut special = self.special(kind, found.station, count, next, found.error);
+            special.remark = match kind {
+                Kind::BranchPoint if null > 1 => format!("{NULL_SPACE}{null}"),
+                Kind::PeriodDoubling if null > 1 => format!("the multiplier -1 has multiplicity {null}"),
+                _ => special.remark,
+            };
             if rate > 0.0 {
                 special.error += rate * self.displacement(&stretch, right, &special);
             }

@@ -321,6 +321,8 @@ impl Point {
 /// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to
 /// rounding. Order of magnitude: the machine precision times a condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
+/// Beginning of the remark that states the dimension of a null space.
+pub(crate) const NULL_SPACE: &str = "the null space has dimension ";
 /// Slope below which branch points cannot be told from folds, and a branch may be vertical.
 pub(crate) const FLAT: f64 = 1e-6;
 
@@ -576,9 +578,11 @@ pub struct SpecialPoint {
 }
 
 impl SpecialPoint {
-    /// Dimension of the null space at a branch point: the number of eigenvalues 0 (multipliers 1).
+    /// Dimension of the null space at a branch point: the number of eigenvalues 0 (multipliers 1). If some of them cross
+    /// in opposite directions, the numbers of unstable ones do not show it and the remark does.
     pub fn kernel(&self) -> usize {
-        self.unstable_before.abs_diff(self.unstable_after).max(1)
+        let stated = self.remark.rsplit_once(NULL_SPACE).and_then(|(_, count)| count.parse().ok());
+        stated.unwrap_or(1).max(self.unstable_before.abs_diff(self.unstable_after))
     }
 
     /// Returns coefficient `k` unless it is zero within its error.

@@ -8,7 +8,9 @@ use super::{System, connections, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::diagram::{
+    Branch, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
+};
 use crate::problem::gauss::Points;
 use crate::problem::impact::{ImpactProblem, stored::impacts};
 use crate::problem::map::MapProblem;
@@ -930,7 +932,7 @@ impl Growth<'_> {
         }
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
-            return Coefficients::none(format!("the null space has dimension {dimension}"));
+            return Coefficients::none(format!("{NULL_SPACE}{dimension}"));
         }
         if special.kind == Kind::PeriodDoubling && !special.remark.is_empty() {
             return Coefficients::none(&special.remark);
