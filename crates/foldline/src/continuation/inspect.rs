@@ -10,7 +10,7 @@ use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, head_along, locate};
-use super::opposite::{Exchange, vanishing};
+use super::opposite::{Around, Exchange};
 use super::straddle::straddle;
 use crate::contract::Sight;
 use crate::diagram::{Cost, Kind, NULL_SPACE, Point, STANDS, SpecialPoint};
@@ -197,7 +197,8 @@ impl Follow<'_> {
             }
             match found {
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
-                    if passes_through(kind, [&left.point, &right.point], &found.station.point) {
+                    let (ends, at) = ([&left.point, &right.point], &found.station.point);
+                    if passes_through(kind, &Around { ends, at, length: stretch.length, error: found.error }) {
                         kind = Kind::BranchPoint;
                     }
                     located.push((kind, jump, found));
@@ -287,10 +288,18 @@ impl Follow<'_> {
             let apart = located.len() < 2 || located[located.len() - 1].2.distance - located[0].2.distance > together;
             // Newton's method may fail exactly at the cut.
             let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
-            let middle = places
-                .into_iter()
-                .filter(|_| apart)
-                .find_map(|place| Some((place, self.cut(left, &stretch, place, cost)?)));
+            let mut middle = None;
+            for place in places.into_iter().filter(|_| apart) {
+                let Some(found) = self.cut(left, &stretch, place, cost) else { continue };
+                // At the special point itself rounding decides on which side the eigenvalues are.
+                let undecided = on_the_border(&found) && !on_the_border(left) && !on_the_border(right);
+                if middle.is_none() || !undecided {
+                    middle = Some((place, found));
+                }
+                if !undecided {
+                    break;
+                }
+            }
             if let Some((cut, middle)) = middle {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
@@ -325,7 +334,11 @@ impl Follow<'_> {
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
             let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
             let null = match kind {
-                Kind::BranchPoint if self.settings.stability => vanishing([&left.point, &right.point], &found.station.point),
+                Kind::BranchPoint if self.settings.stability => {
+                    let (ends, at) = ([&left.point, &right.point], &found.station.point);
+                    let around = Around { ends, at, length: stretch.length, error: found.error };
+                    around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 })
+                }
                 Kind::PeriodDoubling if opposite => 2,
                 _ => 1,
             };
@@ -413,7 +426,8 @@ impl Follow<'_> {
         }
         // Pairs that pass through 0 (1) itself belong to the null space.
         let outer = [&stretch.left.point, &whole.point];
-        let at_zero: i64 = match passed.iter().position(|(kind, ..)| passes_through(*kind, outer, &right.point)) {
+        let around = Around { ends: outer, at: &right.point, length: stretch.length, error };
+        let at_zero: i64 = match passed.iter().position(|(kind, ..)| passes_through(*kind, &around)) {
             Some(index) => {
                 let (_, times, jump) = passed.swap_remove(index);
                 times * jump
@@ -670,23 +684,23 @@ impl Follow<'_> {
 }
 
 /// True if the pair located as a Hopf or torus point passes through 0 (multipliers: through 1) itself, so that the point
-/// is one with a null space of two dimensions: its distance from there is nothing beside that at the ends.
-fn passes_through(kind: Kind, ends: [&Point; 2], at: &Point) -> bool {
-    /// Share of the distance at an end: the accuracy of a located point, relative to a step, with a factor of safety.
-    const NOTHING: f64 = 1e-6;
-    let centre = match kind {
-        Kind::Hopf => 0.0,
-        Kind::Torus => 1.0,
-        _ => return false,
-    };
-    // The second closest, because a pair is meant.
-    let off = |point: &Point| {
-        let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
-        all.sort_by(f64::total_cmp);
-        all.get(1).copied()
-    };
-    let [Some(here), Some(before), Some(after)] = [off(at), off(ends[0]), off(ends[1])] else { return false };
-    here <= NOTHING * before.max(after)
+/// is one with a null space of two dimensions.
+fn passes_through(kind: Kind, around: &Around) -> bool {
+    match kind {
+        Kind::Hopf => around.vanishing(0.0) > 1,
+        Kind::Torus => around.vanishing(1.0) > 1,
+        _ => false,
+    }
+}
+
+/// True if rounding decides whether some eigenvalue or multiplier is stable.
+fn on_the_border(station: &Station) -> bool {
+    /// Distance from the border, relative to the largest eigenvalue.
+    const ROUNDING: f64 = 1e-13;
+    let spectrum = station.point.free_spectrum();
+    let largest = spectrum.iter().map(|z| z.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let off = |z: &Complex64| if is_cycle(station) { z.norm() - 1.0 } else { z.re };
+    spectrum.iter().any(|z| off(z).abs() <= ROUNDING * largest)
 }
 
 /// True if the spectrum consists of multipliers.

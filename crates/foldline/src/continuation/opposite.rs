@@ -125,16 +125,35 @@ impl Follow<'_> {
     }
 }
 
-/// Number of eigenvalues (multipliers) that are 0 (1) at a located point, judged by their distances at the ends of the
-/// step, in order of size.
-pub(super) fn vanishing(ends: [&Point; 2], at: &Point) -> usize {
-    let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
-    let sorted = |point: &Point| {
-        let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
-        all.sort_by(f64::total_cmp);
-        all
-    };
-    let (here, [before, after]) = (sorted(at), ends.map(sorted));
-    let own = here.iter().zip(before.iter().zip(&after));
-    own.take_while(|(here, (before, after))| **here <= NOTHING * before.max(**after)).count()
+/// Places at which the distances of eigenvalues from a centre are compared.
+pub(super) struct Around<'p> {
+    /// The ends of a step.
+    pub ends: [&'p Point; 2],
+    /// A point located on it.
+    pub at: &'p Point,
+    /// Length of the step.
+    pub length: f64,
+    /// Error of the location.
+    pub error: f64,
+}
+
+impl Around<'_> {
+    /// Number of eigenvalues whose distance from `centre` vanishes at the located point, as far as its error lets tell: in
+    /// order of size, their zeros along the curve are no farther from it. Those that vanish along the whole curve, as
+    /// with a conserved quantity, do not count.
+    pub fn vanishing(&self, centre: f64) -> usize {
+        /// A factor of safety.
+        const ERRORS: f64 = 10.0;
+        /// Rounding of a distance along the curve.
+        const LEAST: f64 = 1e-11;
+        let sorted = |point: &Point| {
+            let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        let (here, [before, after]) = (sorted(self.at), self.ends.map(sorted));
+        let reach = ERRORS * self.error.max(LEAST);
+        let own = here.iter().zip(before.iter().zip(&after));
+        own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count()
+    }
 }
