@@ -90,7 +90,7 @@ fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
     let branches = statement.query_map([], |row| {
         Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?, row.get::<_, Option<String>>(4)?))
     });
-    let branches: Vec<(i64, String, String, usize, Option<String>)> = branches.unwrap().map(Result::unwrap).collect();
+    let branches: Vec<(i64, String, String, u32, Option<String>)> = branches.unwrap().map(Result::unwrap).collect();
     let (mut lines, mut checked) = (Vec::new(), 0);
     for (branch, name, family, free, origin) in branches {
         // A boundary-value problem has no stability.
@@ -98,7 +98,7 @@ fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
             continue;
         }
         let (points, special) = (Row::all(&file, branch, false), Row::all(&file, branch, true));
-        let mut say = |row: &Row, what: String| lines.push((name.clone(), format!("{what} at {}", row.parameters[free])));
+        let mut say = |row: &Row, what: String| lines.push((name.clone(), format!("{what} at {}", row.parameters[free as usize])));
         for own in &special {
             let change = (own.counts[1] - own.counts[0]).abs();
             if !allowed(&own.kind, change) {
@@ -120,7 +120,10 @@ fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
         }
         // The special point where a branch starts has the number of the point beside it.
         let edge = |row: &Row| row.position == 0 && origin.is_some();
-        for row in points.iter().filter(|row| !edge(row)) {
+        // At the grazing of an impact the multipliers jump; the stored ones are those of the near side.
+        let grazes =
+            |row: &Row| special.iter().any(|s| s.kind == "impact-grazing" && s.parameters == row.parameters);
+        for row in points.iter().filter(|row| !edge(row) && !grazes(row)) {
             let [least, most] = row.in_spectrum();
             if !(least..=most).contains(&row.counts[0]) {
                 say(row, format!("{} unstable, {least} to {most} in the spectrum", row.counts[0]));
@@ -182,7 +185,7 @@ fn studies_of_every_family_are_accounted_for() {
         ("studies/maps/henon.toml", 40),
         ("studies/maps/logistic.toml", 40),
         ("studies/maps/ikeda.toml", 40),
-        ("studies/tori/laval.toml", 40),
+        ("studies/tori/laval.toml", 15),
         ("studies/boundary/bratu.toml", 0),
         ("studies/exact/one-sided-spring.toml", 40),
         ("studies/exact/belt.toml", 40),
@@ -192,7 +195,7 @@ fn studies_of_every_family_are_accounted_for() {
         ("crates/foldline-campaign/outside/gear-backlash/gbs.toml", 40),
         ("crates/foldline-campaign/outside/separable-wells/study.toml", 100),
         ("crates/foldline-campaign/outside/swap/perms.toml", 20),
-        ("crates/foldline-campaign/outside/linear-resonance/lins.toml", 20),
+        ("crates/foldline-campaign/outside/kerr-pair/study.toml", 20),
     ];
     for (study, points) in table {
         study_is_accounted_for(study, points);
@@ -223,12 +226,12 @@ fn explored_and_resumed_runs_are_accounted_for() {
     let study = "[[explore]]\nname = \"all\"\nfree = \"mu\"\nrange = [-0.5, 0.3]\nvalues = 3\nsamples = 8\n";
     let (folder, run, code) = written(model, study);
     checked(&run, code, 20);
-    let mut code = foldline(&["run", "s.toml", "--out", "parts", "--time-limit", "20ms"], folder.path());
+    let mut code = foldline(&["run", "s.toml", "--out", "parts", "--time-limit", "0.02s"], folder.path());
     for _ in 0..200 {
         if code == 0 {
             break;
         }
-        code = foldline(&["run", "s.toml", "--out", "parts", "--resume", "--time-limit", "60ms"], folder.path());
+        code = foldline(&["run", "s.toml", "--out", "parts", "--resume", "--time-limit", "0.06s"], folder.path());
     }
     checked(&folder.path().join("parts"), code, 20);
 }
