@@ -318,10 +318,10 @@ impl Follow<'_> {
     }
 
     /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,
-    /// because rounding decides on which side of 1 it is computed. Where the multipliers are not known, the number is
-    /// that of the last accepted point.
+    /// because rounding decides on which side of 1 it is computed. Where no digit of the multipliers is certain, the
+    /// number is that of the last accepted point.
     pub(super) fn count(&self, station: &mut Station) {
-        if self.settings.stability && station.point.is_unresolved() {
+        if self.settings.stability && station.point.is_doubtful() {
             station.point.unstable = self.known.unwrap_or(station.point.unstable);
         } else if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
             station.point.unstable = station.point.unstable_besides_neutral();

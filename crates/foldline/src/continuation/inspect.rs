@@ -128,7 +128,7 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
-        // Multipliers of which no digit is known show no event.
+        // Multipliers whose number is not their own show no event.
         let unresolved = self.settings.stability && [left, right].iter().any(|end| end.point.is_unresolved());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();

@@ -649,6 +649,7 @@ impl Growth<'_> {
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
+        let unresolved = Cell::new(false);
         // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
         let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
         let mut sink = |item: Item| {
@@ -695,8 +696,9 @@ impl Growth<'_> {
                     if let Some((_, after)) = grazed.take().filter(|(there, _)| *there == point.parameters) {
                         point.unstable = after;
                     }
-                    let before = latest.replace(point.clone());
-                    if recorded && point.is_unresolved() && !before.is_unresolved() && !self.unresolved(branch, &point) {
+                    latest.replace(point.clone());
+                    let doubted = recorded && point.is_unresolved() && !unresolved.replace(true);
+                    if doubted && !self.unresolved(branch, &point) {
                         return Verdict::Stop;
                     }
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
