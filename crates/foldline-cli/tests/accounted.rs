@@ -82,7 +82,7 @@ fn allowed(kind: &str, change: i64) -> bool {
     }
 }
 
-/// What the files of a run do not explain, one line each, with the branch.
+/// Returns the number of steps checked, and the changes that the files of a run do not explain, one line each, with the branch.
 fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
     let file = Connection::open(run.join("run.sqlite")).unwrap();
     let mut statement =
@@ -98,7 +98,9 @@ fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
             continue;
         }
         let (points, special) = (Row::all(&file, branch, false), Row::all(&file, branch, true));
-        let mut say = |row: &Row, what: String| lines.push((name.clone(), format!("{what} at {}", row.parameters[free as usize])));
+        let mut say = |row: &Row, what: String| {
+            lines.push((name.clone(), format!("{what} at {}", row.parameters[free as usize])))
+        };
         for own in &special {
             let change = (own.counts[1] - own.counts[0]).abs();
             if !allowed(&own.kind, change) {
@@ -121,8 +123,7 @@ fn unexplained(run: &Path) -> (usize, Vec<(String, String)>) {
         // The special point where a branch starts has the number of the point beside it.
         let edge = |row: &Row| row.position == 0 && origin.is_some();
         // At the grazing of an impact the multipliers jump; the stored ones are those of the near side.
-        let grazes =
-            |row: &Row| special.iter().any(|s| s.kind == "impact-grazing" && s.parameters == row.parameters);
+        let grazes = |row: &Row| special.iter().any(|s| s.kind == "impact-grazing" && s.parameters == row.parameters);
         for row in points.iter().filter(|row| !edge(row) && !grazes(row)) {
             let [least, most] = row.in_spectrum();
             if !(least..=most).contains(&row.counts[0]) {
@@ -213,7 +214,11 @@ fn impact_cycles_are_accounted_for() {
     checked(&run, code, 10);
     let file = Connection::open(run.join("run.sqlite")).unwrap();
     let grazings: i64 = file
-        .query_row("SELECT count(*) FROM special_points WHERE kind = 'impact-grazing' AND unstable_before <> unstable_after", [], |row| row.get(0))
+        .query_row(
+            "SELECT count(*) FROM special_points WHERE kind = 'impact-grazing' AND unstable_before <> unstable_after",
+            [],
+            |row| row.get(0),
+        )
         .unwrap();
     assert!(grazings > 0, "no grazing at which the number of unstable multipliers changes");
 }

@@ -186,7 +186,9 @@ fn null_spaces_of_several_dimensions_are_named_and_all_branches_are_found() {
             assert!(form.is_empty() || own.2.as_deref() == Some(*form), "{name}: {found:?}");
         }
         let followed: i64 = file
-            .query_row("SELECT count(*) FROM branches WHERE origin_name = 'b' AND origin_kind IS NOT NULL", [], |row| row.get(0))
+            .query_row("SELECT count(*) FROM branches WHERE origin_name = 'b' AND origin_kind IS NOT NULL", [], |row| {
+                row.get(0)
+            })
             .unwrap();
         let images = text.matches("already known").count();
         assert_eq!(followed as usize + images, case.leaving, "{name}: {text}");

@@ -220,7 +220,7 @@ impl Follow<'_> {
                 Some(Exchange::Apart(there)) => cut_there = Some(there),
                 Some(Exchange::Together(kind, found)) => {
                     for _ in 0..if kind == Kind::PeriodDoubling { 2 } else { 1 } {
-                        located.push((kind, usize::from(kind == Kind::PeriodDoubling), found.clone()));
+                        located.push((kind, usize::from(kind == Kind::PeriodDoubling), (*found).clone()));
                         others.push(None);
                     }
                 }

@@ -22,12 +22,12 @@ use super::locate::{Located, Stretch};
 use crate::diagram::{Cost, Kind, Point};
 use num_complex::Complex64;
 
-/// What happens to two eigenvalues on opposite sides.
+/// Outcome for two eigenvalues on opposite sides.
 pub(super) enum Exchange {
     /// They cross at different places; the step must be cut at this distance.
     Apart(f64),
     /// They cross at one place.
-    Together(Kind, Located),
+    Together(Kind, Box<Located>),
 }
 
 /// Share of the distance at the ends that counts as zero: the accuracy of a located point, relative to a step, with a
@@ -76,7 +76,11 @@ impl Follow<'_> {
     ) -> Option<Exchange> {
         let (history, left) = (history?, &stretch.left.point);
         let of_cycle = left.solution.period().is_some();
-        let kinds = [(0.0, Kind::BranchPoint, !of_cycle), (1.0, Kind::BranchPoint, of_cycle), (-1.0, Kind::PeriodDoubling, of_cycle)];
+        let kinds = [
+            (0.0, Kind::BranchPoint, !of_cycle),
+            (1.0, Kind::BranchPoint, of_cycle),
+            (-1.0, Kind::PeriodDoubling, of_cycle),
+        ];
         for (centre, kind, _) in kinds.into_iter().filter(|(.., applies)| *applies) {
             let skipped = left.spectrum.len() - left.free_spectrum().len();
             let before = history.spectrum.get(skipped..).and_then(|own| beside(own, centre));
@@ -96,7 +100,7 @@ impl Follow<'_> {
             let there = 0.5 * (first + second);
             let Ok(station) = stretch.at(self.problem, self.settings, there, cost) else { continue };
             let error = gap + self.settings.newton_tolerance();
-            return Some(Exchange::Together(kind, Located { distance: there, station, error }));
+            return Some(Exchange::Together(kind, Box::new(Located { distance: there, station, error })));
         }
         None
     }

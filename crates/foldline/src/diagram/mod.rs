@@ -998,9 +998,8 @@ impl Branch {
     /// Number of special points of the same kind at exactly the same point, this one included: eigenvalues or multipliers
     /// that cross simultaneously.
     pub fn together_with(&self, special: &SpecialPoint) -> usize {
-        let same = |other: &&SpecialPoint| {
-            other.kind == special.kind && other.point.parameters == special.point.parameters
-        };
+        let same =
+            |other: &&SpecialPoint| other.kind == special.kind && other.point.parameters == special.point.parameters;
         self.special.iter().filter(same).count().max(1)
     }
 

@@ -74,9 +74,7 @@ impl Line {
     ) -> Option<Line> {
         let (tangent, there) = match mesh.is_empty() {
             true => (found.tangent.clone(), found.u.clone()),
-            false => {
-                (problem.transfer(&found.tangent, &found.mesh, mesh), problem.carry(&found.u, &found.mesh, mesh))
-            }
+            false => (problem.transfer(&found.tangent, &found.mesh, mesh), problem.carry(&found.u, &found.mesh, mesh)),
         };
         let chord: Vec<f64> = there.iter().zip(u).map(|(a, b)| a - b).collect();
         let distance = problem.dot(&chord, &chord).sqrt();
