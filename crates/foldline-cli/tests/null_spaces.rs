@@ -190,6 +190,14 @@ fn null_spaces_of_several_dimensions_are_named_and_all_branches_are_found() {
                 row.get(0)
             })
             .unwrap();
+        // Nor has the same point coefficients where a branch that left it passes it.
+        let sql =
+            "SELECT count(*) FROM special_points WHERE kind <> 'hopf' AND coefficient_count > 0 AND abs(p) < 1e-6";
+        let coefficients: i64 = file.query_row(sql, [], |row| row.get(0)).unwrap();
+        assert!(
+            coefficients == 0 || case.says.is_empty(),
+            "{name}: coefficients at a null space of several dimensions"
+        );
         let images = text.matches("already known").count();
         assert_eq!(followed as usize + images, case.leaving, "{name}: {text}");
     }

@@ -461,9 +461,12 @@ impl Follow<'_> {
                 if jump == 1 && kind == Kind::BranchPoint { (1, times) } else { (times.abs(), times.signum() * jump) };
             for _ in 0..steps {
                 let mut special = self.special(kind, right.clone(), count, count + change, error);
-                if kind == Kind::PeriodDoubling && steps > 1 {
-                    special.remark = format!("the multiplier -1 has multiplicity {steps}");
-                }
+                let null = around.vanishing(if is_cycle(right) { 1.0 } else { 0.0 });
+                special.remark = match kind {
+                    Kind::PeriodDoubling if steps > 1 => format!("the multiplier -1 has multiplicity {steps}"),
+                    Kind::BranchPoint if null > 1 => format!("{NULL_SPACE}{null}"),
+                    _ => special.remark,
+                };
                 out.push(Found::Special(special));
                 count += change;
             }
