@@ -150,6 +150,8 @@ impl Around<'_> {
         const ERRORS: f64 = 10.0;
         /// Rounding of a distance along the curve.
         const LEAST: f64 = 1e-11;
+        /// Share of the step beyond which the error of the location tells nothing.
+        const MOST: f64 = 0.1;
         let sorted = |point: &Point| {
             let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
             all.sort_by(f64::total_cmp);
@@ -157,6 +159,9 @@ impl Around<'_> {
         };
         let (here, [before, after]) = (sorted(self.at), self.ends.map(sorted));
         let reach = ERRORS * self.error.max(LEAST);
+        if reach > MOST * self.length.abs() {
+            return 0;
+        }
         let own = here.iter().zip(before.iter().zip(&after));
         own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count()
     }
