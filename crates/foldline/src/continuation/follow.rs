@@ -54,12 +54,14 @@ pub struct Follow<'w> {
     pub homecoming: Homecoming,
     /// Length of the step under inspection. What is significant along it is significant on its parts.
     pub inspected: f64,
+    /// Number of unstable eigenvalues or multipliers at the last accepted point; `None` before the first.
+    pub known: Option<usize>,
 }
 
 impl Follow<'_> {
     /// Continuation of another problem with these settings, from a new start.
     pub fn on<'p>(&'p self, problem: &'p mut dyn ZeroProblem) -> Follow<'p> {
-        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, ..*self }
+        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, known: None, ..*self }
     }
 }
 
@@ -120,6 +122,7 @@ pub fn follow(
     let mut allowance = Allowance::new();
     let mut before: Option<Station> = None;
     loop {
+        walk.known = Some(left.point.unstable);
         if let Some(end) = walk.at_bound(&left, 1e-12) {
             return end;
         }
@@ -201,7 +204,10 @@ pub fn follow(
             _ => found,
         };
         let (end, found) = walk.up_to_end(end, found, &mut right);
-        let (crossing, end, found) = walk.up_to_surface(&left, end, found, &mut right, &mut cost);
+        let (crossing, end, mut found) = walk.up_to_surface(&left, end, found, &mut right, &mut cost);
+        if walk.settings.stability {
+            walk.at_contact([&left, &right], &mut found);
+        }
         let between = between.filter(|_| !crossing);
         let between = between.unwrap_or_else(|| walk.between(&left, &right));
         let (angle, length) = (between.angle, between.along);
@@ -312,10 +318,35 @@ impl Follow<'_> {
     }
 
     /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,
-    /// because rounding decides on which side of 1 it is computed.
+    /// because rounding decides on which side of 1 it is computed. Where no digit of the multipliers is certain, the
+    /// number is that of the last accepted point.
     pub(super) fn count(&self, station: &mut Station) {
-        if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
+        if self.settings.stability && station.point.is_doubtful() {
+            station.point.unstable = self.known.unwrap_or(station.point.unstable);
+        } else if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
             station.point.unstable = station.point.unstable_besides_neutral();
+        }
+    }
+
+    /// Attributes to a grazing the change of stability at which a vertical branch begins or ends there: along it a
+    /// multiplier is 1 and does not count; beyond, in contact, it is on one side.
+    fn at_contact(&self, [left, right]: [&Station; 2], found: &mut [Found]) {
+        let [before, after] = [left.point.unstable, right.point.unstable];
+        let ends = left.point.is_one_of_family() != right.point.is_one_of_family();
+        let steady = |item: &Found| match item {
+            Found::Special(special) => special.unstable_before == before && special.unstable_after == before,
+            Found::Inserted(..) => false,
+        };
+        if !ends || before.abs_diff(after) != 1 || !found.iter().all(steady) {
+            return;
+        }
+        let grazes = |item: &Found| matches!(item, Found::Special(special) if special.kind == Kind::Grazing);
+        let Some(first) = found.iter().position(grazes) else { return };
+        for (index, item) in found.iter_mut().enumerate().skip(first) {
+            let Found::Special(special) = item else { continue };
+            let counts = if index == first { [before, after] } else { [after; 2] };
+            let [low, high] = if self.direction > 0.0 { counts } else { [counts[1], counts[0]] };
+            (special.unstable_before, special.unstable_after) = (low, high);
         }
     }
 

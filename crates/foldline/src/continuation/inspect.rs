@@ -10,9 +10,10 @@ use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, head_along, locate};
+use super::opposite::{Around, Exchange};
 use super::straddle::straddle;
 use crate::contract::Sight;
-use crate::diagram::{Cost, Kind, Point, STANDS, SpecialPoint};
+use crate::diagram::{Cost, Kind, NULL_SPACE, Point, STANDS, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -127,6 +128,8 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
+        // Multipliers whose number is not their own show no event.
+        let unresolved = self.settings.stability && [left, right].iter().any(|end| end.point.is_unresolved());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -136,6 +139,11 @@ impl Follow<'_> {
             let pitchfork = kind == Kind::BranchPoint
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             let without = match kind {
+                Kind::Fold | Kind::BranchPoint | Kind::PeriodDoubling | Kind::Torus
+                    if unresolved && (kind != Kind::Fold || fold_test != FoldTest::Slope) =>
+                {
+                    true
+                }
                 Kind::Fold => standing,
                 Kind::BranchPoint => fold_test != FoldTest::Slope && !conservative,
                 // Reciprocal pairs of multipliers have product 1 everywhere.
@@ -189,6 +197,10 @@ impl Follow<'_> {
             }
             match found {
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
+                    let (ends, at) = ([&left.point, &right.point], &found.station.point);
+                    if passes_through(kind, &Around { ends, at, length: stretch.length, error: found.error }) {
+                        kind = Kind::BranchPoint;
+                    }
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
                 }
@@ -199,6 +211,20 @@ impl Follow<'_> {
                     leaps |= kind == Kind::PeriodDoubling
                 }
                 Err(_) => lost = true,
+            }
+        }
+        let mut cut_there = None;
+        let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
+        if self.settings.stability && quiet && !unresolved && fold_test == FoldTest::Slope && depth < CLOSE {
+            match self.exchanged(&stretch, &right.point, history, cost) {
+                Some(Exchange::Apart(there)) => cut_there = Some(there),
+                Some(Exchange::Together(kind, found)) => {
+                    for _ in 0..if kind == Kind::PeriodDoubling { 2 } else { 1 } {
+                        located.push((kind, usize::from(kind == Kind::PeriodDoubling), (*found).clone()));
+                        others.push(None);
+                    }
+                }
+                None => {}
             }
         }
         // If both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed sign. That is
@@ -242,9 +268,9 @@ impl Follow<'_> {
         };
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
-        let mut seen = None;
+        let mut seen = cut_there;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
-        if depth == 0 && jumps.is_empty() && unknown {
+        if depth == 0 && jumps.is_empty() && unknown && seen.is_none() {
             seen = self.seen_between(&stretch, [&at_left, &at_right], history.is_none(), cost);
         }
         let suspicious = suspicious || seen.is_some();
@@ -262,10 +288,18 @@ impl Follow<'_> {
             let apart = located.len() < 2 || located[located.len() - 1].2.distance - located[0].2.distance > together;
             // Newton's method may fail exactly at the cut.
             let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
-            let middle = places
-                .into_iter()
-                .filter(|_| apart)
-                .find_map(|place| Some((place, self.cut(left, &stretch, place, cost)?)));
+            let mut middle = None;
+            for place in places.into_iter().filter(|_| apart) {
+                let Some(found) = self.cut(left, &stretch, place, cost) else { continue };
+                // At the special point itself rounding decides on which side the eigenvalues are.
+                let undecided = on_the_border(&found) && !on_the_border(left) && !on_the_border(right);
+                if middle.is_none() || !undecided {
+                    middle = Some((place, found));
+                }
+                if !undecided {
+                    break;
+                }
+            }
             if let Some((cut, middle)) = middle {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
@@ -291,6 +325,7 @@ impl Follow<'_> {
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
         let total = located.len();
+        let opposite = quiet && total == 2;
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
             while let Some(mark) = marks.next_if(|(_, mark, _)| mark.distance < found.distance) {
                 out.push(self.marked_there(mark, count));
@@ -298,7 +333,21 @@ impl Follow<'_> {
             let target = right.point.unstable as i64;
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
             let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
+            let null = match kind {
+                Kind::BranchPoint if self.settings.stability => {
+                    let (ends, at) = ([&left.point, &right.point], &found.station.point);
+                    let around = Around { ends, at, length: stretch.length, error: found.error };
+                    around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 })
+                }
+                Kind::PeriodDoubling if opposite => 2,
+                _ => 1,
+            };
             let mut special = self.special(kind, found.station, count, next, found.error);
+            special.remark = match kind {
+                Kind::BranchPoint if null > 1 => format!("{NULL_SPACE}{null}"),
+                Kind::PeriodDoubling if null > 1 => format!("the multiplier -1 has multiplicity {null}"),
+                _ => special.remark,
+            };
             if rate > 0.0 {
                 special.error += rate * self.displacement(&stretch, right, &special);
             }
@@ -347,7 +396,7 @@ impl Follow<'_> {
         fold_test: FoldTest,
         cost: &mut Cost,
     ) -> Option<Vec<Found>> {
-        let ends = self.narrowed(stretch, right, cost);
+        let (whole, ends) = (right, self.narrowed(stretch, right, cost));
         let [left, right] = [&ends[0], &ends[1]];
         let error = discrepancy(
             self.settings,
@@ -375,6 +424,21 @@ impl Follow<'_> {
                 passed.push((kind, times, monitor.jump() as i64));
             }
         }
+        // Pairs that pass through 0 (1) itself belong to the null space.
+        let outer = [&stretch.left.point, &whole.point];
+        let around = Around { ends: outer, at: &right.point, length: stretch.length, error };
+        let at_zero: i64 = match passed.iter().position(|(kind, ..)| passes_through(*kind, &around)) {
+            Some(index) => {
+                let (_, times, jump) = passed.swap_remove(index);
+                times * jump
+            }
+            None => 0,
+        };
+        if at_zero != 0 {
+            let own = passed.iter().position(|(kind, ..)| matches!(kind, Kind::BranchPoint | Kind::Fold));
+            let rest = own.map_or(0, |index| passed.swap_remove(index).1);
+            passed.push((Kind::BranchPoint, at_zero + rest, 1));
+        }
         if passed.is_empty() && turns && self.is_symmetric(&right.point) {
             return Some(self.fold_with_pitchfork(right, error));
         }
@@ -396,7 +460,14 @@ impl Follow<'_> {
             let (steps, change) =
                 if jump == 1 && kind == Kind::BranchPoint { (1, times) } else { (times.abs(), times.signum() * jump) };
             for _ in 0..steps {
-                out.push(Found::Special(self.special(kind, right.clone(), count, count + change, error)));
+                let mut special = self.special(kind, right.clone(), count, count + change, error);
+                let null = around.vanishing(if is_cycle(right) { 1.0 } else { 0.0 });
+                special.remark = match kind {
+                    Kind::PeriodDoubling if steps > 1 => format!("the multiplier -1 has multiplicity {steps}"),
+                    Kind::BranchPoint if null > 1 => format!("{NULL_SPACE}{null}"),
+                    _ => special.remark,
+                };
+                out.push(Found::Special(special));
                 count += change;
             }
         }
@@ -613,6 +684,26 @@ impl Follow<'_> {
             bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
         })
     }
+}
+
+/// True if the pair located as a Hopf or torus point passes through 0 (multipliers: through 1) itself, so that the point
+/// is one with a null space of two dimensions.
+fn passes_through(kind: Kind, around: &Around) -> bool {
+    match kind {
+        Kind::Hopf => around.vanishing(0.0) > 1,
+        Kind::Torus => around.vanishing(1.0) > 1,
+        _ => false,
+    }
+}
+
+/// True if rounding decides whether some eigenvalue or multiplier is stable.
+fn on_the_border(station: &Station) -> bool {
+    /// Distance from the border, relative to the largest eigenvalue.
+    const ROUNDING: f64 = 1e-13;
+    let spectrum = station.point.free_spectrum();
+    let largest = spectrum.iter().map(|z| z.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    let off = |z: &Complex64| if is_cycle(station) { z.norm() - 1.0 } else { z.re };
+    spectrum.iter().any(|z| off(z).abs() <= ROUNDING * largest)
 }
 
 /// True if the spectrum consists of multipliers.

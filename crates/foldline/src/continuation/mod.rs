@@ -13,6 +13,7 @@
 //! | limit on the work of a side | `allowance` |
 //! | special points between two accepted points | [`inspect`] |
 //! | requested values along the way | `marks` |
+//! | eigenvalues that cross in opposite directions | `opposite` |
 //! | side of nearby special points on which a point lies | `side` |
 //! | zero of a monitor along the curve | [`locate`] |
 //! | zero of a monitor where branches cross | [`straddle`] |
@@ -28,6 +29,7 @@ pub mod inspect;
 mod judge;
 pub mod locate;
 mod marks;
+mod opposite;
 mod side;
 mod step;
 pub mod straddle;

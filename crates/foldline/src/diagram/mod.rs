@@ -215,6 +215,25 @@ impl Point {
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
+    /// True if the stated error of the multipliers leaves open on which side of the unit circle one of them lies, because
+    /// no digit of it is certain: near orbits of infinite period and along canards, multipliers are so far apart that
+    /// rounding may decide.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        /// Error, relative to the larger of 1 and the modulus, at which no digit is left.
+        const NONE: f64 = 1.0;
+        let error = self.trust.spectrum;
+        let of_cycle = matches!(self.solution, Solution::Cycle(_));
+        let may_pass = |z: &Complex64| (z.norm() - 1.0).abs() <= error * z.norm().max(1.0);
+        of_cycle && error >= NONE && self.free_spectrum().iter().any(may_pass)
+    }
+
+    /// True if the number of unstable multipliers is that of a neighbour, because the multipliers are doubtful and their
+    /// own number is another.
+    pub(crate) fn is_unresolved(&self) -> bool {
+        let own = self.free_spectrum().iter().filter(|z| z.norm() > 1.0).count();
+        self.is_doubtful() && own != self.unstable
+    }
+
     /// Distance from 1 within which a multiplier may be exactly 1.
     fn neutral_error(&self) -> f64 {
         /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less
@@ -310,6 +329,8 @@ impl Point {
 /// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to
 /// rounding. Order of magnitude: the machine precision times a condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
+/// Beginning of the remark that states the dimension of a null space.
+pub(crate) const NULL_SPACE: &str = "the null space has dimension ";
 /// Slope below which branch points cannot be told from folds, and a branch may be vertical.
 pub(crate) const FLAT: f64 = 1e-6;
 
@@ -565,9 +586,11 @@ pub struct SpecialPoint {
 }
 
 impl SpecialPoint {
-    /// Dimension of the null space at a branch point: the number of eigenvalues 0 (multipliers 1).
+    /// Dimension of the null space at a branch point: the number of eigenvalues 0 (multipliers 1). If some of them cross
+    /// in opposite directions, the numbers of unstable ones do not show it and the remark does.
     pub fn kernel(&self) -> usize {
-        self.unstable_before.abs_diff(self.unstable_after).max(1)
+        let stated = self.remark.rsplit_once(NULL_SPACE).and_then(|(_, count)| count.parse().ok());
+        stated.unwrap_or(1).max(self.unstable_before.abs_diff(self.unstable_after))
     }
 
     /// Returns coefficient `k` unless it is zero within its error.
@@ -970,6 +993,14 @@ impl Branch {
         let (first, last) = self.special.split_at(own.unwrap_or(self.special.len()));
         let earlier = if own.is_some() && special.point.position < 0 { last } else { first };
         earlier.iter().filter(same).count()
+    }
+
+    /// Number of special points of the same kind at exactly the same point, this one included: eigenvalues or multipliers
+    /// that cross simultaneously.
+    pub fn together_with(&self, special: &SpecialPoint) -> usize {
+        let same =
+            |other: &&SpecialPoint| other.kind == special.kind && other.point.parameters == special.point.parameters;
+        self.special.iter().filter(same).count().max(1)
     }
 
     /// Inserts a special point at its position.

@@ -419,9 +419,17 @@ impl Work<'_> {
             let below = pending.switching.below(special.kind, counts[slot]);
             let leaving = Leaving { plan, settings: &settings, parent: &parent, special, label, below };
             let of_torus = matches!(special.point.solution, Solution::Torus(_));
-            let kernel = if special.kind == Kind::BranchPoint && !of_torus { special.kernel() } else { 1 };
+            let kernel = match special.kind {
+                Kind::BranchPoint if !of_torus => special.kernel(),
+                Kind::PeriodDoubling if !of_torus => parent.together_with(special),
+                _ => 1,
+            };
             let going = match kernel {
                 1 => self.left(&leaving, name, &mut more),
+                _ if special.kind == Kind::PeriodDoubling && parent.earlier_there(special) > 0 => {
+                    let said = format!("{}: its branches are those of the period doubling with it", leaving.label);
+                    self.tell(Event::Note(&parent.name, &said))
+                }
                 _ => self.left_in_all_directions(&leaving, &name, kernel, &mut more),
             };
             if !going {
@@ -510,6 +518,10 @@ impl Work<'_> {
             ),
         };
         let family = parent.family;
+        let said = match special.kind {
+            Kind::PeriodDoubling => said.replace("null space", "multiplier -1 with a null space"),
+            _ => said,
+        };
         self.tell(Event::Note(&parent.name, &said))
             && found.beginnings.into_iter().enumerate().all(|(index, beginning)| {
                 let own = if index == 0 { name.to_string() } else { format!("{name}-{}", index + 1) };
@@ -541,7 +553,8 @@ impl Work<'_> {
         let (free, degree, first) = (parent.free, self.plan.degree, &station.point);
         let known = known::branch_of(self.system, settings, free, degree, first, &self.branches, self.observer);
         // Branches are too close to a parent with a null space of several dimensions; their direction told them apart.
-        let parted = special.kind == Kind::BranchPoint && special.kernel() > 1;
+        let together = special.kind == Kind::PeriodDoubling && parent.together_with(special) > 1;
+        let parted = special.kind == Kind::BranchPoint && special.kernel() > 1 || together;
         if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
             return self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, already known")));
         }

@@ -8,7 +8,9 @@ use super::{System, connections, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
+use crate::diagram::{
+    Branch, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
+};
 use crate::problem::gauss::Points;
 use crate::problem::impact::{ImpactProblem, stored::impacts};
 use crate::problem::map::MapProblem;
@@ -637,6 +639,7 @@ impl Growth<'_> {
             first_period: branch.points.iter().min_by_key(|p| p.position.abs()).and_then(|p| p.solution.free_period()),
             homecoming: Homecoming::default(),
             inspected: 0.0,
+            known: None,
         };
         // A resumed run may already be on its way back to the start.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
@@ -646,6 +649,9 @@ impl Growth<'_> {
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
+        let unresolved = Cell::new(false);
+        // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
+        let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -666,6 +672,8 @@ impl Growth<'_> {
                         let next = found.as_ref().map(|(_, next)| next);
                         self.tell_impacts(&system, branch, side, &mut special, next);
                         beyond.replace(found);
+                        let after = if side == 1 { special.unstable_after } else { special.unstable_before };
+                        grazed.replace(Some((special.point.parameters.clone(), after)));
                     }
                     self.tell_folds(&system, branch, &mut special);
                     if branch.family == Family::Arc {
@@ -679,11 +687,20 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    let misfit = record.borrow_mut().special(&plain);
+                    let counted = if special.kind == Kind::ImpactGrazing { &special } else { &plain };
+                    let misfit = record.borrow_mut().special(counted);
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
+                    // The grazing cycle itself follows its special point and belongs to the far side.
+                    if let Some((_, after)) = grazed.take().filter(|(there, _)| *there == point.parameters) {
+                        point.unstable = after;
+                    }
                     latest.replace(point.clone());
+                    let doubted = recorded && point.is_unresolved() && !unresolved.replace(true);
+                    if doubted && !self.unresolved(branch, &point) {
+                        return Verdict::Stop;
+                    }
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
@@ -723,7 +740,6 @@ impl Growth<'_> {
             let Some((mut problem, mut next)) = beyond.take() else { break };
             let position = there.position + if side == 1 { 1 } else { -1 };
             next.point.position = position;
-            record.replace(Record::at(&next.point, side == 1));
             let mut walk = Follow { holds: false, ..walk.on(&mut *problem) };
             ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
                 true => Ending::Stopped,
@@ -918,7 +934,13 @@ impl Growth<'_> {
         }
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
-            return Coefficients::none(format!("the null space has dimension {dimension}"));
+            return Coefficients::none(format!("{NULL_SPACE}{dimension}"));
+        }
+        if special.kind == Kind::PeriodDoubling && !special.remark.is_empty() {
+            return Coefficients::none(&special.remark);
+        }
+        if special.kind == Kind::Hopf && special::hopf::share_a_frequency(&special.point) {
+            return Coefficients::none("two pairs of eigenvalues cross with the same frequency");
         }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };

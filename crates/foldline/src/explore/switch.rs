@@ -73,7 +73,7 @@ pub(super) fn step_off(
 
 /// Steps off like [`step_off`], with the initial guess `improved`.
 #[expect(clippy::too_many_arguments, reason = "those of `step_off` and one more")]
-fn step_off_from(
+pub(super) fn step_off_from(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     base: &[f64],
@@ -218,6 +218,37 @@ fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle)
     Some((Box::new(problem), base, direction))
 }
 
+/// Returns the problem of doubled cycles at a period doubling, the cycle over two turns, and the tangent of its branch.
+/// `None` for cycles with events.
+pub(super) fn twice<'a>(system: &'a System, free: usize, at: &SpecialPoint) -> Option<Doubled<'a>> {
+    let Solution::Cycle(cycle) = &at.point.solution else { return None };
+    let own = setting(system, free, &at.point.parameters);
+    if Flights::of(system.field, &at.point.parameters, cycle).is_some() {
+        return None;
+    }
+    let size = cycle.profile.len();
+    let (along, rest) = at.point.tangent.split_at_checked(size)?;
+    let (twice, _) = period_doubling::doubled(cycle, &[]);
+    let solution = Solution::Cycle(twice.clone());
+    let mut tangent = [along, along, rest].concat();
+    let mut problem: Box<dyn ZeroProblem> = match system.field.iterated() {
+        true => Box::new(MapProblem::like(own, &solution)),
+        // The period of two turns changes twice as fast.
+        false => {
+            tangent[2 * size] *= 2.0;
+            Box::new(CycleProblem::like(own, &twice).with_equal_halves())
+        }
+    };
+    let base = problem.unknowns_of(&Point { solution, ..at.point.clone() });
+    if tangent.len() != base.len() {
+        return None;
+    }
+    problem.anchor(&base);
+    let norm = problem.dot(&tangent, &tangent).sqrt();
+    tangent.iter_mut().for_each(|t| *t /= norm);
+    Some((problem, base, tangent))
+}
+
 /// Problem, unknowns and direction of [`double`] for cycles with events. Over two turns, a period doubling is a branch point.
 fn double_flights<'a>(
     system: &'a System,
@@ -248,8 +279,19 @@ fn double_flights<'a>(
 pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.point.solution else { return None };
     let (mut problem, base, direction) = double(system, free, at, cycle)?;
-    problem.anchor(&base);
-    let norm = problem.dot(&direction, &direction).sqrt();
+    Some(edge_along(&mut *problem, &base, &direction, at, next))
+}
+
+/// Returns the edge of a doubled branch that leaves along `direction`; see [`doubled_edge`].
+pub(super) fn edge_along(
+    problem: &mut dyn ZeroProblem,
+    base: &[f64],
+    direction: &[f64],
+    at: &SpecialPoint,
+    next: &Point,
+) -> Point {
+    problem.anchor(base);
+    let norm = problem.dot(direction, direction).sqrt();
     let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
     let once = &at.point;
     let examination = Examination {
@@ -268,7 +310,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
             slope: once.trust.slope,
         },
     };
-    Some(problem.point(&base, &tangent, examination))
+    problem.point(base, &tangent, examination)
 }
 
 fn born(
@@ -279,11 +321,9 @@ fn born(
     at: &SpecialPoint,
     pair: usize,
 ) -> Result<Beginning, String> {
-    // Inverse iteration cannot separate the eigenspaces of frequencies that are closer than this, relative.
-    const SAME: f64 = 1e-6;
     let all = hopf::frequencies(&at.point);
     let omega = *all.get(pair).ok_or("no eigenvector of an imaginary pair of eigenvalues was found")?;
-    if pair > 0 && all[..pair].iter().any(|other| (other / omega - 1.0).abs() < SAME) {
+    if pair > 0 && all[..pair].iter().any(|other| (other / omega - 1.0).abs() < hopf::SAME) {
         return Err(format!(
             "two pairs of eigenvalues have the same frequency {omega:.6}; only one branch of cycles is searched for there"
         ));

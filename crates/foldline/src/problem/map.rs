@@ -27,7 +27,7 @@ use num_complex::Complex64;
 
 /// Distance of a modulus from 1, in units of the rounding error of a step, within which the multiplier is on the unit
 /// circle: those of an area-preserving map stay there.
-const ON_CIRCLE: f64 = 64.0;
+pub(crate) const ON_CIRCLE: f64 = 64.0;
 
 /// f and its derivatives at all iterates of a cycle.
 #[derive(Clone, Debug, Default)]

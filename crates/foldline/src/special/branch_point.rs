@@ -76,7 +76,7 @@ impl Monitor for BranchPoint {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 };
+        let centre = if at.solution.period().is_some() { 1.0 } else { 0.0 } + super::rounding(at);
         Some(self.spectrum_without_symmetry(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
     }
 

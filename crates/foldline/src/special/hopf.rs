@@ -71,6 +71,15 @@ pub fn frequencies(at: &Point) -> Vec<f64> {
     there.iter().map(|z| z.im).collect()
 }
 
+/// Relative difference of two frequencies below which their eigenvectors cannot be told apart.
+pub(crate) const SAME: f64 = 1e-6;
+
+/// True if two pairs are on the imaginary axis with the same frequency.
+pub fn share_a_frequency(at: &Point) -> bool {
+    let all = frequencies(at);
+    (1..all.len()).any(|k| all[..k].iter().any(|other| (other / all[k] - 1.0).abs() < SAME))
+}
+
 /// Relative Newton update after which an equilibrium is converged: its square, the error left by quadratic convergence,
 /// is rounding.
 const CONVERGED: f64 = 1e-8;

@@ -92,6 +92,14 @@ pub fn monitors_where_held<'a>(
     all
 }
 
+/// Distance beyond the unit circle up to which a multiplier counts as on it: of maps, the rounding of the product.
+fn rounding(at: &Point) -> f64 {
+    match at.solution.period().filter(|_| at.solution.is_of_map()) {
+        Some(iterates) => crate::problem::map::ON_CIRCLE * f64::EPSILON * iterates,
+        None => 0.0,
+    }
+}
+
 /// Product of (z - at) / (1 + |z|) over the spectrum: real for a spectrum closed under conjugation and a real `at`.
 fn distance_product(spectrum: &[Complex64], at: f64) -> f64 {
     product(|| spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())))

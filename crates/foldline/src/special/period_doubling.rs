@@ -32,7 +32,8 @@ impl Monitor for PeriodDoubling {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        Some(at.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re < -1.0).count())
+        let circle = 1.0 + super::rounding(at);
+        Some(at.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re < -circle).count())
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {

@@ -56,7 +56,8 @@ impl Monitor for Torus {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        Some(at.free_spectrum().iter().filter(|z| z.im > 0.0 && z.norm() > 1.0).count())
+        let circle = 1.0 + super::rounding(at);
+        Some(at.free_spectrum().iter().filter(|z| z.im > 0.0 && z.norm() > circle).count())
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {

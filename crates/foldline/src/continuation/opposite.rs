@@ -1,0 +1,168 @@
+//! Eigenvalues that cross in opposite directions on one step.
+//!
+//! **Idea.** If two real eigenvalues pass 0 (multipliers: 1 or -1) on one step, one upwards and one downwards, neither
+//! the number of unstable ones nor the sign of a test function differs at the ends. Two real eigenvalues on either side
+//! that are about to exchange sides are therefore followed through the step, each as the one that is closest to the line
+//! between its two ends. If both vanish at different places, the step is cut in between; if at the same place, the null
+//! space there has two dimensions.
+//!
+//! **Equations.** With a₊ > 0 > a₋ the distances at the left end that are closest to 0, b₊ and b₋ those at the right end
+//! at distance L, and a′ the rates of change on the step before:
+//!
+//! ```text
+//!   (1)  a₊ + L a₊′ < 0,  a₋ + L a₋′ > 0           about to exchange sides
+//!   (2)  λ(s) closest to a₊ + (b₋ - a₊) s/L,  λ(s) = 0
+//! ```
+//!
+//! **Fails when** the step before shows no trend towards 0, or more than one pair exchanges sides.
+
+use super::follow::Follow;
+use super::inspect::History;
+use super::locate::{Located, Stretch};
+use crate::diagram::{Cost, Kind, Point};
+use num_complex::Complex64;
+
+/// Outcome for two eigenvalues on opposite sides.
+pub(super) enum Exchange {
+    /// They cross at different places; the step must be cut at this distance.
+    Apart(f64),
+    /// They cross at one place.
+    Together(Kind, Box<Located>),
+}
+
+/// Share of the distance at the ends that counts as zero: the accuracy of a located point, relative to a step, with a
+/// factor of safety.
+const NOTHING: f64 = 1e-6;
+/// Largest number of halvings of an interval in search of one zero: from a long step to rounding.
+const HALVINGS: usize = 50;
+/// Factor by which the trend of the step before may fall short.
+const TREND: f64 = 1.5;
+
+/// Distances from `centre` of the real eigenvalues closest to it, above and below.
+fn beside(spectrum: &[Complex64], centre: f64) -> Option<[f64; 2]> {
+    let real = || spectrum.iter().filter(|z| z.im == 0.0).map(|z| z.re - centre);
+    let above = real().filter(|x| *x > 0.0).min_by(f64::total_cmp)?;
+    let below = real().filter(|x| *x < 0.0).max_by(f64::total_cmp)?;
+    Some([above, below])
+}
+
+/// Points of a step and the one before it, as far as the search needs them.
+struct Lines {
+    centre: f64,
+    /// Values at the left end, above and below.
+    from: [f64; 2],
+    /// Values at the right end to which they lead.
+    to: [f64; 2],
+    length: f64,
+}
+
+impl Lines {
+    /// The eigenvalue of `at` that is closest to line `k` at distance s.
+    fn value(&self, k: usize, s: f64, at: &Point) -> Option<f64> {
+        let expected = self.from[k] + (self.to[k] - self.from[k]) * s / self.length;
+        let real = at.free_spectrum().iter().filter(|z| z.im == 0.0).map(|z| z.re - self.centre);
+        real.min_by(|a, b| (a - expected).abs().total_cmp(&(b - expected).abs()))
+    }
+}
+
+impl Follow<'_> {
+    /// Looks for eigenvalues that exchange sides; see the module.
+    pub(super) fn exchanged(
+        &mut self,
+        stretch: &Stretch,
+        right: &Point,
+        history: Option<&History>,
+        cost: &mut Cost,
+    ) -> Option<Exchange> {
+        let (history, left) = (history?, &stretch.left.point);
+        let of_cycle = left.solution.period().is_some();
+        let kinds = [
+            (0.0, Kind::BranchPoint, !of_cycle),
+            (1.0, Kind::BranchPoint, of_cycle),
+            (-1.0, Kind::PeriodDoubling, of_cycle),
+        ];
+        for (centre, kind, _) in kinds.into_iter().filter(|(.., applies)| *applies) {
+            let skipped = left.spectrum.len() - left.free_spectrum().len();
+            let before = history.spectrum.get(skipped..).and_then(|own| beside(own, centre));
+            let ends = [left, right].map(|point| beside(point.free_spectrum(), centre));
+            let (Some(before), [Some(from), Some(to)]) = (before, ends) else { continue };
+            let trend = |k: usize| from[k] + TREND * stretch.length.abs() * (from[k] - before[k]) / history.distance;
+            if trend(0) > 0.0 || trend(1) < 0.0 {
+                continue;
+            }
+            let lines = Lines { centre, from, to: [to[1], to[0]], length: stretch.length };
+            let found = [0, 1].map(|k| self.zero_of(stretch, &lines, k, cost));
+            let [Some(first), Some(second)] = found else { continue };
+            let gap = (first - second).abs();
+            if gap > 1e-7 * (1.0 + stretch.length.abs()) {
+                return Some(Exchange::Apart(0.5 * (first + second)));
+            }
+            let there = 0.5 * (first + second);
+            let Ok(station) = stretch.at(self.problem, self.settings, there, cost) else { continue };
+            let error = gap + self.settings.newton_tolerance();
+            return Some(Exchange::Together(kind, Box::new(Located { distance: there, station, error })));
+        }
+        None
+    }
+
+    /// Distance at which the eigenvalue on a line vanishes, by bisection; `None` if none does.
+    fn zero_of(&mut self, stretch: &Stretch, lines: &Lines, k: usize, cost: &mut Cost) -> Option<f64> {
+        let (mut low, mut high) = (0.0, stretch.length);
+        let (up, size) = (lines.from[k] < 0.0, lines.from[k].abs().max(lines.to[k].abs()));
+        let mut last = f64::INFINITY;
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            // At the point itself the matrix may be singular.
+            let near = [middle, middle + 1e-3 * (high - low)];
+            let found = near.into_iter().find_map(|s| {
+                let there = stretch.at(self.problem, self.settings, s, cost).ok()?;
+                Some((s, lines.value(k, s, &there.point)?))
+            });
+            let Some((s, value)) = found else { break };
+            last = value.abs();
+            if last == 0.0 || (high - low).abs() < 1e-12 {
+                return (last <= NOTHING * size).then_some(s);
+            }
+            if (value > 0.0) == up { high = s } else { low = s }
+        }
+        (last <= NOTHING * size).then_some(0.5 * (low + high))
+    }
+}
+
+/// Places at which the distances of eigenvalues from a centre are compared.
+pub(super) struct Around<'p> {
+    /// The ends of a step.
+    pub ends: [&'p Point; 2],
+    /// A point located on it.
+    pub at: &'p Point,
+    /// Length of the step.
+    pub length: f64,
+    /// Error of the location.
+    pub error: f64,
+}
+
+impl Around<'_> {
+    /// Number of eigenvalues whose distance from `centre` vanishes at the located point, as far as its error lets tell: in
+    /// order of size, their zeros along the curve are no farther from it. Those that vanish along the whole curve, as
+    /// with a conserved quantity, do not count.
+    pub fn vanishing(&self, centre: f64) -> usize {
+        /// A factor of safety.
+        const ERRORS: f64 = 10.0;
+        /// Rounding of a distance along the curve.
+        const LEAST: f64 = 1e-11;
+        /// Share of the step beyond which the error of the location tells nothing.
+        const MOST: f64 = 0.1;
+        let sorted = |point: &Point| {
+            let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        let (here, [before, after]) = (sorted(self.at), self.ends.map(sorted));
+        let reach = ERRORS * self.error.max(LEAST);
+        if reach > MOST * self.length.abs() {
+            return 0;
+        }
+        let own = here.iter().zip(before.iter().zip(&after));
+        own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count()
+    }
+}
