@@ -389,6 +389,9 @@ pub struct Table {
     /// Results of surveys and sweeps
     #[arg(long, group = "what")]
     pub responses: bool,
+    /// Answers to design questions
+    #[arg(long, group = "what")]
+    pub designs: bool,
     /// Derivatives of the special points with respect to every parameter
     #[arg(long, group = "what")]
     pub sensitivities: bool,
@@ -425,6 +428,7 @@ pub enum What {
     Points,
     Branches,
     Responses,
+    Designs,
     Notes,
     Sensitivities,
     Uncertainty,
@@ -436,6 +440,7 @@ impl Table {
             (self.points, What::Points),
             (self.branches, What::Branches),
             (self.responses, What::Responses),
+            (self.designs, What::Designs),
             (self.notes, What::Notes),
             (self.sensitivities, What::Sensitivities),
             (self.uncertainty, What::Uncertainty),

@@ -1,6 +1,7 @@
 //! `foldline table`: the results of a run.
 
 mod columns;
+mod designs;
 mod format;
 mod responses;
 mod sensitivity;
@@ -84,7 +85,7 @@ pub enum Cell {
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let part = match typed.what() {
         What::Points | What::Branches => Part::Numbers,
-        What::Special | What::Responses | What::Notes => Part::Special,
+        What::Special | What::Responses | What::Designs | What::Notes => Part::Special,
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
     if typed.position.is_some() {
@@ -117,6 +118,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Branches => columns::branches(diagram, model, &kept),
         What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
+        What::Designs => designs::designs(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
@@ -178,6 +180,9 @@ pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
         let special = columns::special(diagram, model, &[], &|_| true);
         if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
+    }
+    if !diagram.designs.is_empty() {
+        format::text(&designs::designs(diagram, model), &mut out)?;
     }
     if !diagram.responses.is_empty() {
         format::text(&responses::summary(diagram, model), &mut out)?;

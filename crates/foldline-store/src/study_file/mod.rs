@@ -9,6 +9,7 @@
 mod append;
 mod branches;
 mod curves;
+mod designs;
 mod explorations;
 mod grown;
 mod holds;
@@ -73,7 +74,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 19] = [
+const ROOT_KEYS: [&str; 20] = [
     "model",
     "title",
     "description",
@@ -93,6 +94,7 @@ const ROOT_KEYS: [&str; 19] = [
     "explore",
     "survey",
     "sweep",
+    "design",
 ];
 
 /// Reads a study file and the model that it names. On failure, returns every mistake found.
@@ -198,7 +200,7 @@ fn with_settings(text: &str, settings: &[(&str, String)]) -> String {
 /// True if a text is a study rather than a model: it names a model or something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
-    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep"];
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design"];
     keys.iter().any(|key| root.get_ref().contains_key(*key))
 }
 
@@ -245,6 +247,9 @@ fn parse(
     let sweeps = responses::sweeps(&mut walk, &root, &ground, &seeds, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
     let explorations = explorations::read(&mut walk, &root, &model, &defaults, &taken);
+    let taken: Vec<&str> = taken.iter().copied().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
+    let taken: Vec<&str> = taken.into_iter().chain(explorations.iter().map(|e| e.name.as_str())).collect();
+    let designs = designs::read(&mut walk, &root, &ground, &explorations, &taken);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
         check_totals(&mut walk, &root, &model);
     }
@@ -269,6 +274,7 @@ fn parse(
         explorations,
         surveys,
         sweeps,
+        designs,
         record,
     };
     Ok(Study {
@@ -290,6 +296,7 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
     if model.conditions() == [0, 0] {
         return;
     }
+    designs::refuse(walk, root, "boundary-value problems");
     for key in ["explore", "survey", "sweep", "curve"] {
         let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
         let (message, hint) = match key {
@@ -321,6 +328,7 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
     if events == 0 {
         return;
     }
+    designs::refuse(walk, root, "models with events");
     let kinks = model.switch_count() - events;
     for (key, message, hint) in [
         (
@@ -518,7 +526,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed, branch, curve, homotopy, exploration, survey and sweep a name of its own",
+            "give every seed, branch, curve, homotopy, exploration, survey, sweep and design question a name of its own",
         );
     }
     Some(name)
@@ -566,5 +574,6 @@ mod tests {
         assert_eq!(keys("/$defs/explore/properties"), sorted(&explorations::KEYS));
         assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
         assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
+        assert_eq!(keys("/$defs/design/properties"), sorted(&designs::KEYS));
     }
 }

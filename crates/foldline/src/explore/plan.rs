@@ -247,6 +247,42 @@ pub struct SweepPlan {
     pub values: Vec<f64>,
 }
 
+/// Condition that a design is to meet.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wanted {
+    /// The branch has no solution.
+    NoMotion,
+    /// The branch has no stable solution.
+    NotStable,
+    /// A quantity stays below this level wherever the branch has a solution.
+    Below(Level),
+}
+
+/// A design question: the value of one parameter beyond which a condition is met over a range of another one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DesignPlan {
+    /// Unique name.
+    pub name: String,
+    /// Name of the branch: one of the plan, one switched to from it, or one found by an exploration.
+    pub of: String,
+    /// Names of the branch's parameter and of the design parameter, for messages.
+    pub names: [String; 2],
+    /// Index of the branch's parameter.
+    pub free: usize,
+    /// Its range.
+    pub range: [f64; 2],
+    /// Index of the design parameter.
+    pub vary: usize,
+    /// Range in which its value is sought.
+    pub within: [f64; 2],
+    /// True if the greatest value is sought, below which the condition is met.
+    pub greatest: bool,
+    /// The condition.
+    pub wanted: Wanted,
+    /// Limit on the number of points of each run.
+    pub max_points: usize,
+}
+
 /// All requests of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -272,6 +308,8 @@ pub struct Plan {
     pub surveys: Vec<SurveyPlan>,
     /// Stepped sweeps by simulation.
     pub sweeps: Vec<SweepPlan>,
+    /// Design questions.
+    pub designs: Vec<DesignPlan>,
     /// Further columns of tables and exports: names and quantities.
     pub record: Vec<(String, Quantity)>,
 }
@@ -299,6 +337,7 @@ impl Plan {
             explorations: Vec::new(),
             surveys: Vec::new(),
             sweeps: Vec::new(),
+            designs: Vec::new(),
             record: Vec::new(),
         }
     }
