@@ -23,10 +23,8 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     let targets = targets(plan);
     for branch in &diagram.branches {
         // Answers to design questions say what their runs leave open.
-        if plan.designs.iter().any(|own| is_run(&branch.name, &own.name)) {
-            continue;
-        }
-        let is_leg = plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some());
+        let is_run = plan.designs.iter().any(|own| is_run(&branch.name, &own.name));
+        let is_leg = is_run || plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some());
         if !is_leg {
             let target = targets.iter().find(|(name, _)| **name == branch.name).and_then(|(_, target)| *target);
             lines.extend(ended(branch, target, model));

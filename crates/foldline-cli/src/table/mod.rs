@@ -17,7 +17,7 @@ use foldline::explore::plan::Plan;
 use foldline::model::{Model, Spread};
 use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
-use foldline_store::order::{leg, ordered};
+use foldline_store::order::{is_run, leg, ordered};
 use foldline_store::run_file::{Part, load_part};
 use foldline_store::short;
 use foldline_store::study_file::parse_study_of_run;
@@ -178,7 +178,9 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
-        let special = columns::special(diagram, model, &[], &|_| true);
+        // The runs for design questions are in `foldline table`.
+        let shown = |branch: &Branch| !diagram.designs.iter().any(|own| is_run(&branch.name, &own.name));
+        let special = columns::special(diagram, model, &[], &shown);
         if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
     }
     if !diagram.designs.is_empty() {

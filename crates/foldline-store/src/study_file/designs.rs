@@ -97,9 +97,9 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, explorations: &[ExplorePl
         let free = base.plan.free;
         return Some(Base { name, free, range: base.plan.range, parameters: base.beginning });
     }
-    let exploration = explorations.iter().find(|own| {
-        name.strip_prefix(&own.name).is_some_and(|rest| rest.starts_with('/') && rest.len() > 1)
-    });
+    let exploration = explorations
+        .iter()
+        .find(|own| name.strip_prefix(&own.name).is_some_and(|rest| rest.starts_with('/') && rest.len() > 1));
     if let Some(own) = exploration {
         let parameters = own.parameters.iter().map(|value| Some(*value)).collect();
         return Some(Base { name, free: own.free, range: own.range, parameters });
@@ -117,12 +117,8 @@ fn own_range(walk: &mut Walk, table: &DeTable, base: &Base, model: &Model) -> Op
     let [low, high] = base.range;
     if own[0] < low || own[1] > high {
         let free = &model.parameters[base.free].name;
-        let message = format!(
-            "the branch \"{}\" is followed in {free} from {} to {} only",
-            base.name,
-            Shown(low),
-            Shown(high)
-        );
+        let message =
+            format!("the branch \"{}\" is followed in {free} from {} to {} only", base.name, Shown(low), Shown(high));
         walk.report(value.span(), message, "a range within that, or a wider range of the branch");
         return None;
     }
@@ -235,4 +231,3 @@ fn refuse_name_of_part(walk: &mut Walk, table: &DeTable, name: Option<&str>, tak
         walk.report(value.span(), message, "give it another name, without a `/` if possible");
     }
 }
-

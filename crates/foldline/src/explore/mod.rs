@@ -85,8 +85,8 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource, Start,
-    SurveyPlan, SweepPlan, Switching, Wanted,
+    AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource,
+    Start, SurveyPlan, SweepPlan, Switching, Wanted,
 };
 pub use seeds::{attractors, first_solution};
 pub use sizes::{scales_from, state_scales};

@@ -62,7 +62,10 @@ impl Search<'_> {
         let (low, high) = there.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if low > high {
             let curve = &candidate.curve;
-            self.note(&format!("{curve} at {:.9}: nothing to be avoided beside it", Shown(self.at(&candidate.point)[1])));
+            self.note(&format!(
+                "{curve} at {:.9}: nothing to be avoided beside it",
+                Shown(self.at(&candidate.point)[1])
+            ));
             return None;
         }
         let what = match &self.design.wanted {
@@ -72,7 +75,7 @@ impl Search<'_> {
         };
         let [free, p] = self.design.names.clone();
         let names = format!("at {p} = {:.6} {what} from {free} = {:.6}", Shown(value), Shown(low));
-        self.checks.push(format!("{names} to {:.6} ({})", Shown(high), diagram.name));
+        self.check(format!("{names} to {:.6} ({})", Shown(high), diagram.name));
         Some(diagram)
     }
 
@@ -121,14 +124,14 @@ impl Search<'_> {
                         Wanted::NoMotion => "absent".into(),
                     };
                     let text = format!("at {p} = {:.6} the motion: {what} ({})", Shown(target), diagram.name);
-                    self.checks.push(text);
+                    self.check(text);
                 }
             }
         }
         if !crossed {
             let p = &self.design.names[1];
             let text = format!("lines in {p} from inside leave the part to be avoided before {:.6}", Shown(beyond));
-            self.checks.push(text);
+            self.check(text);
         } else if seeds.is_empty() {
             self.reasons.push(format!(
                 "solutions to be avoided were found beyond {} = {:.9}, but not where they end",

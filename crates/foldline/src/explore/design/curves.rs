@@ -2,7 +2,7 @@
 
 use super::super::family::Work;
 use super::super::plan::{BranchPlan, CurvePlan, Holds, Start, Switching, Wanted};
-use super::super::curves;
+use super::super::{curves, holds};
 use super::search::{Candidate, Search, Seed};
 use crate::diagram::{Binds, Branch, Ending, Kind, Origin, Point, SpecialPoint};
 use crate::special::mark::Mark;
@@ -48,11 +48,7 @@ impl Search<'_> {
         self.curves.iter().filter(|(_, kind)| *kind == seed.special.kind).any(|(index, _)| {
             let curve = &self.legs[*index];
             let start = curve.points.iter().filter(|point| point.position == 0);
-            let passes = curve.special.iter().map(|special| &special.point).chain(start).any(near);
-            // The point at which a curve of a bound starts is brought to the bound first.
-            let same = matches!(&curve.origin, Origin::Switch { parent, parameter, .. }
-                if *parent == seed.of && *parameter == at);
-            passes || same
+            curve.special.iter().map(|special| &special.point).chain(start).any(near)
         })
     }
 
@@ -61,8 +57,20 @@ impl Search<'_> {
     fn wider(&self) -> [f64; 2] {
         let [low, high] = self.design.range;
         let more = BEYOND * (high - low);
-        let lower = if low > 0.0 { (low - more).max(0.5 * low) } else if low < 0.0 { low - more } else { low };
-        let upper = if high < 0.0 { (high + more).min(0.5 * high) } else if high > 0.0 { high + more } else { high };
+        let lower = if low > 0.0 {
+            (low - more).max(0.5 * low)
+        } else if low < 0.0 {
+            low - more
+        } else {
+            low
+        };
+        let upper = if high < 0.0 {
+            (high + more).min(0.5 * high)
+        } else if high > 0.0 {
+            high + more
+        } else {
+            high
+        };
         [lower, upper]
     }
 
@@ -73,7 +81,10 @@ impl Search<'_> {
         let name = format!("{}/{stem}-{number}", self.design.name);
         let start = self.at(&seed.special.point)[1];
         let mut marks = self.marks();
-        marks.push(Mark::at(Quantity::Parameter(self.design.vary), start, false));
+        if seed.of == self.design.of {
+            // The other special points of the branch lie at this value.
+            marks.push(Mark::at(Quantity::Parameter(self.design.vary), start, false));
+        }
         match &self.design.wanted {
             Wanted::Below(level) if kind == Kind::Mark => {
                 let vary = Quantity::Parameter(self.design.vary);
@@ -107,9 +118,10 @@ impl Search<'_> {
                     branches: Vec::new(),
                     budget: usize::MAX,
                 };
-                let (branch, going) = work
-                    .held(&plan, origin.clone(), Ok(seed.special.point.clone()))
-                    .unwrap_or_else(|| (Branch::new(&plan.name, crate::diagram::Family::Cycle, plan.free, origin), true));
+                let (branch, going) =
+                    work.held(&plan, origin.clone(), Ok(seed.special.point.clone())).unwrap_or_else(|| {
+                        (Branch::new(&plan.name, crate::diagram::Family::Cycle, plan.free, origin), true)
+                    });
                 self.going &= going;
                 branch
             }
@@ -150,6 +162,50 @@ impl Search<'_> {
         }
     }
 
+    /// Points of the branch at which the quantity has its bound.
+    pub(super) fn crossings(&mut self, branch: &Branch) -> Vec<Seed> {
+        let Wanted::Below(level) = &self.design.wanted else { return Vec::new() };
+        let off = |point: &Point| level.quantity.on(point, self.system.field).unwrap_or(f64::NAN) - level.value;
+        let settings = self.settings([f64::NEG_INFINITY, f64::INFINITY]);
+        // The branch's parameter is solved for, the design parameter fixed.
+        let holds = Holds { others: vec![(self.design.free, None)], levels: vec![level.clone()], near: None };
+        let plan = BranchPlan {
+            name: self.design.name.clone(),
+            start: Start::Seed(0),
+            free: self.design.vary,
+            range: self.design.within,
+            until: None,
+            switching: Switching::default(),
+            marks: Vec::new(),
+            max_points: self.design.max_points,
+            holds: holds.clone(),
+        };
+        let mut found = Vec::new();
+        for pair in branch.points.windows(2).filter(|pair| off(&pair[0]) * off(&pair[1]) <= 0.0) {
+            let nearer = if off(&pair[0]).abs() < off(&pair[1]).abs() { &pair[0] } else { &pair[1] };
+            let Some(start) = self.whole(branch, nearer) else { continue };
+            let Ok(station) = holds::first(self.system, &plan, &holds, self.plan.degree, &settings, &start) else {
+                continue;
+            };
+            let point = station.point;
+            if !self.in_range(&point) {
+                continue;
+            }
+            let special = SpecialPoint {
+                kind: Kind::Mark,
+                unstable_before: point.unstable,
+                unstable_after: point.unstable,
+                error: settings.newton_tolerance(),
+                coefficients: Vec::new(),
+                coefficient_errors: Vec::new(),
+                remark: String::new(),
+                point,
+            };
+            found.push(Seed { special, of: branch.name.clone() });
+        }
+        found
+    }
+
     /// All candidates, the farthest in the direction of the search first.
     pub(super) fn candidates(&self) -> Vec<Candidate> {
         let mut all: Vec<Candidate> = Vec::new();
@@ -173,8 +229,7 @@ impl Search<'_> {
                     all.push(make(&special.point, special.error, Binds::LowerEnd));
                 } else if end(high) {
                     all.push(make(&special.point, special.error, Binds::UpperEnd));
-                } else if self.in_range(&special.point)
-                    && (special.kind == turns || special.kind.has_codimension_two())
+                } else if self.in_range(&special.point) && (special.kind == turns || special.kind.has_codimension_two())
                 {
                     all.push(make(&special.point, special.error, Binds::Inside));
                 }

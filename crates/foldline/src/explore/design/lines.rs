@@ -40,7 +40,8 @@ impl Search<'_> {
             }
         }
         let special = |a: &Point, b: &Point| {
-            let own = |s: &&crate::diagram::SpecialPoint| a.position <= s.point.position && s.point.position < b.position;
+            let own =
+                |s: &&crate::diagram::SpecialPoint| a.position <= s.point.position && s.point.position < b.position;
             of.special.iter().filter(own).cloned().collect::<Vec<_>>()
         };
         for pair in of.points.windows(2) {
@@ -118,9 +119,8 @@ impl Search<'_> {
             sparse: false,
         };
         let known = self.earlier.branch(&name).filter(|branch| !branch.points.is_empty());
-        let mut branch = known.cloned().unwrap_or_else(|| {
-            Branch::new(&name, self.system.family_of(&start.solution), free, origin)
-        });
+        let mut branch =
+            known.cloned().unwrap_or_else(|| Branch::new(&name, self.system.family_of(&start.solution), free, origin));
         let going = match known {
             Some(_) => growth.resume(&mut branch),
             None => {

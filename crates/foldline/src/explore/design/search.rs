@@ -1,7 +1,7 @@
 //! The search for one answer.
 
-use super::super::plan::{DesignPlan, Plan, Wanted};
 use super::super::System;
+use super::super::plan::{DesignPlan, Plan, Wanted};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Answer, Binds, Branch, Design, Diagram, Ending, Kind, Point, Shown, SpecialPoint};
 
@@ -42,6 +42,8 @@ pub(super) struct Search<'s> {
     pub(super) going: bool,
     pub(super) reasons: Vec<String>,
     pub(super) checks: Vec<String>,
+    /// Ends of the branch and of lines on other solutions: the kind of special point, the last point, and a sentence.
+    joined: Vec<(Kind, Point, String)>,
 }
 
 impl<'s> Search<'s> {
@@ -65,6 +67,7 @@ impl<'s> Search<'s> {
             going: true,
             reasons: Vec::new(),
             checks: Vec::new(),
+            joined: Vec::new(),
         }
     }
 
@@ -89,17 +92,26 @@ impl<'s> Search<'s> {
             self.reasons.push(format!("the branch {} has no points", of.name));
             return None;
         };
-        if !self.avoided_somewhere(of) {
+        let starts = self.starts(of);
+        if starts.is_empty() && !self.avoided_somewhere(of) {
             return None;
         }
         let mut seeds = self.seeds_on(of, None);
-        for (number, point) in self.starts(of).into_iter().enumerate() {
-            let line = self.line(&point, &format!("line-{}", number + 1), self.limit());
+        seeds.extend(self.ends_of(of));
+        let mut back: Vec<Point> = Vec::new();
+        for point in starts {
+            // A line that turned may have come back at this solution.
+            if back.iter().any(|end| self.same(end, &point)) {
+                continue;
+            }
+            let line = self.line(&point, &format!("line-{}", back.len() + 1), self.limit());
             seeds.extend(self.seeds_on(&line, None));
             self.judge_line(&line);
             if !self.going {
                 return None;
             }
+            let end = if self.design.greatest { line.points.first() } else { line.points.last() };
+            back.push(end.cloned().unwrap_or(point));
         }
         let mut best: Option<Candidate> = None;
         for round in 0..ROUNDS {
@@ -145,7 +157,8 @@ impl<'s> Search<'s> {
         let size = self.system.unit(self.design.vary) + value.abs();
         Answer {
             value,
-            error: candidate.error * size,
+            // Newton's method stops at its own tolerance, however small the located error is.
+            error: candidate.error.max(self.settings([value, value]).newton_tolerance()) * size,
             at,
             binds: candidate.binds,
             kind: candidate.kind,
@@ -216,45 +229,79 @@ impl<'s> Search<'s> {
     /// Special points of a branch in the range from which curves of the boundary start; with `beyond`, those farther in the
     /// direction of the search than this value.
     pub(super) fn seeds_on(&mut self, branch: &Branch, beyond: Option<f64>) -> Vec<Seed> {
-        let farther = |point: &Point| {
-            beyond.is_none_or(|value| self.progress(self.at(point)[1]) > self.progress(value))
-        };
+        let farther =
+            |point: &Point| beyond.is_none_or(|value| self.progress(self.at(point)[1]) > self.progress(value));
         let boundary = |special: &SpecialPoint| match &self.design.wanted {
             Wanted::NoMotion => special.kind == Kind::Fold,
             Wanted::NotStable => {
                 let stable = special.unstable_before.min(special.unstable_after) == 0;
                 stable && special.unstable_before != special.unstable_after && FOLLOWED.contains(&special.kind)
             }
-            Wanted::Below(_) => special.kind == Kind::Mark || special.kind == Kind::Fold && self.avoided(&special.point),
+            Wanted::Below(_) => {
+                special.kind == Kind::Mark || special.kind == Kind::Fold && self.avoided(&special.point)
+            }
         };
         let own = branch.special.iter().filter(|s| self.in_range(&s.point) && farther(&s.point) && boundary(s));
         let mut seeds: Vec<Seed> =
             own.map(|special| Seed { special: special.clone(), of: branch.name.clone() }).collect();
+        if let Wanted::NotStable = self.design.wanted {
+            let lost = |s: &&SpecialPoint| {
+                s.unstable_before.min(s.unstable_after) == 0 && s.unstable_before != s.unstable_after
+            };
+            let own = branch.special.iter().filter(|s| self.in_range(&s.point) && farther(&s.point)).filter(lost);
+            let [free, p] = &self.design.names;
+            let said = own.filter(|special| !FOLLOWED.contains(&special.kind)).map(|special| {
+                let [at, value] = self.at(&special.point).map(Shown);
+                format!(
+                    "stability changes at a point of kind {} at {free} = {at:.6}, {p} = {value:.6}, which is not followed \
+                     in two parameters",
+                    special.kind
+                )
+            });
+            let said: Vec<String> = said.collect();
+            self.reasons.extend(said);
+        }
         // A branch of the study has no marks of the bound.
-        if let Wanted::Below(level) = &self.design.wanted
+        if let Wanted::Below(_) = self.design.wanted
             && branch.name == self.design.of
         {
-            let value = |point: &Point| level.quantity.on(point, self.system.field).unwrap_or(f64::NAN) - level.value;
-            for pair in branch.points.windows(2) {
-                if value(&pair[0]) * value(&pair[1]) <= 0.0
-                    && pair.iter().any(|point| self.in_range(point))
-                    && let Some(point) = self.whole(branch, &pair[0])
-                {
-                    let special = SpecialPoint {
-                        kind: Kind::Mark,
-                        unstable_before: point.unstable,
-                        unstable_after: point.unstable,
-                        error: f64::INFINITY,
-                        coefficients: Vec::new(),
-                        coefficient_errors: Vec::new(),
-                        remark: String::new(),
-                        point,
-                    };
-                    seeds.push(Seed { special, of: branch.name.clone() });
-                }
-            }
+            seeds.extend(self.crossings(branch));
         }
         seeds
+    }
+
+    /// Special points at which the branch ends on other solutions inside the range, where these are followed too.
+    fn ends_of(&mut self, of: &Branch) -> Vec<Seed> {
+        let mut seeds = Vec::new();
+        for (point, end) in [(of.points.first(), &of.ends[0]), (of.points.last(), &of.ends[1])] {
+            let (Some(point), Some(end)) = (point, end) else { continue };
+            if !self.in_range(point) || matches!(end, Ending::Bound(_) | Ending::Closed | Ending::Stopped) {
+                continue;
+            }
+            let [at, _] = self.at(point);
+            let text =
+                format!("the branch {} ends at {} = {:.6}: {}", of.name, self.design.names[0], Shown(at), end.brief());
+            let Ending::Joined { at: kind, parameter } = end else {
+                self.reasons.push(text);
+                continue;
+            };
+            let near = |special: &&SpecialPoint| {
+                let value = special.point.parameters.get(of.free).copied().unwrap_or(f64::NAN);
+                special.kind == *kind && (value - parameter).abs() < MEETING * of.size(*parameter)
+            };
+            let others = self.branches.iter().filter(|own| own.name != of.name && own.free == of.free);
+            let found =
+                others.filter(|own| own.held.is_none()).find_map(|own| Some((own, own.special.iter().find(near)?)));
+            seeds.extend(found.map(|(own, special)| Seed { special: special.clone(), of: own.name.clone() }));
+            self.joined.push((*kind, point.clone(), text));
+        }
+        seeds
+    }
+
+    /// True if two solutions at one value of the branch's parameter are the same.
+    fn same(&self, a: &Point, b: &Point) -> bool {
+        const SAME: f64 = 1e-4;
+        self.at(a) == self.at(b) && a.difference(b, self.system.measure(), &[]) < SAME
     }
 
     /// A point with its profile.
@@ -288,6 +335,15 @@ impl<'s> Search<'s> {
                 Shown(value)
             )),
             Ending::Bound(_) | Ending::Closed | Ending::Stopped => {}
+            Ending::Joined { at: kind, .. } => {
+                let text = format!(
+                    "at {free} = {:.6} the solutions in {p} end at {:.6}: {}",
+                    Shown(at),
+                    Shown(value),
+                    end.brief()
+                );
+                self.joined.push((*kind, last.clone(), text));
+            }
             other => self.reasons.push(format!(
                 "at {free} = {:.6} the solutions in {p} end at {:.6}: {}",
                 Shown(at),
@@ -331,10 +387,33 @@ impl<'s> Search<'s> {
                 }
             }
         }
+        for (kind, point, text) in std::mem::take(&mut self.joined) {
+            let [at, value] = self.at(&point);
+            let near = |other: &Point| {
+                let [a, v] = self.at(other);
+                let close = |x: f64, y: f64, index: usize| {
+                    (x - y).abs() <= MEETING * (self.system.unit(index) + x.abs().max(y.abs()))
+                };
+                close(a, at, self.design.free) && close(v, value, self.design.vary)
+            };
+            let own = self.curves.iter().filter(|(_, own)| *own == kind).map(|(index, _)| &self.legs[*index]);
+            let passes = own.flat_map(|curve| {
+                curve
+                    .special
+                    .iter()
+                    .map(|special| &special.point)
+                    .chain(curve.points.iter().filter(|p| p.position == 0))
+            });
+            if !passes.into_iter().any(near) {
+                self.reasons.push(text);
+            }
+        }
         let mut seen = Vec::new();
-        self.reasons.retain(|reason| !seen.contains(reason) && {
-            seen.push(reason.clone());
-            true
+        self.reasons.retain(|reason| {
+            !seen.contains(reason) && {
+                seen.push(reason.clone());
+                true
+            }
         });
     }
 
@@ -344,10 +423,20 @@ impl<'s> Search<'s> {
         (value - target).abs() <= 1e-9 * (high - low)
     }
 
+    /// Records a check.
+    pub(super) fn check(&mut self, text: String) {
+        self.note(&text);
+        self.checks.push(text);
+    }
+
     pub(super) fn note(&mut self, text: &str) {
         self.going &= self.observer.observe(Event::Note(&self.design.name, text)) == Verdict::Continue;
     }
 }
+
+/// Distance, relative to size, between the last point of a branch and the special point of another one at which it ends:
+/// branches end before they meet the other one.
+const MEETING: f64 = 1e-3;
 
 /// Bifurcations at which stability ends and that are followed in two parameters.
 const FOLLOWED: [Kind; 5] = [Kind::Fold, Kind::PeriodDoubling, Kind::Torus, Kind::Hopf, Kind::BranchPoint];
