@@ -179,3 +179,44 @@ fn what_is_not_answered_says_why() {
     said("met", "has no solution");
     said("low", "everywhere");
 }
+
+#[test]
+fn the_centre_of_an_isola_is_followed_in_a_third_parameter() {
+    // Solutions exist for p + p³ ≤ q only, at l = 2 + 0.2pq last; as equilibria, and as cycles of a forced model.
+    let right = "q - p - p^3 - (l - 2 - 0.2*p*q)^2 - (x - l)^2";
+    let parameters = "[parameters]\nl = 2.2\np = 0.5\nq = 2\nw = 3\n";
+    let equilibria = format!("name = \"m\"\n{parameters}[states]\nx = \"{right} + 0*w\"\n");
+    let cycles =
+        format!("name = \"m\"\n{parameters}[forcing]\nfrequency = \"w\"\n[states]\nx = \"{right} + 0*cos(w*t)\"\n");
+    let study = [
+        ON_ISOLA.to_string(),
+        question("map", "least = { p = [0.2, 3] }\nwithout = \"motion\"\nalong = { q = [1, 6] }"),
+    ]
+    .concat();
+    for model in [equilibria, cycles] {
+        let found = answers(&model, &study);
+        exact(answered(&found, "map"), 1.0);
+        assert!(found.shortfalls.is_empty(), "{:?}", found.shortfalls);
+        let boundary = found.branch("map/along").unwrap();
+        let q = |k: usize| boundary.points[k].parameters[2];
+        let last = boundary.points.len() - 1;
+        assert!(last > 5 && (q(0) - 1.0).abs() < 1e-9 && (q(last) - 6.0).abs() < 1e-9, "{} {}", q(0), q(last));
+        for point in &boundary.points {
+            let [l, p, q] = [0, 1, 2].map(|k| point.parameters[k]);
+            assert!((p + p.powi(3) - q).abs() < 1e-6, "{p} {q}");
+            assert!((l - 2.0 - 0.2 * p * q).abs() < 1e-5, "{l} {p} {q}");
+        }
+    }
+}
+
+#[test]
+fn an_answer_at_the_end_of_the_range_is_not_followed_further_and_says_so() {
+    let model = "name = \"m\"\n[parameters]\nl = 2.2\np = 0.5\nq = 2\n[states]\n\
+        x = \"q - p - p^3 - (l - 2 - 0.2*p*q)^2 - (x - l)^2\"\n";
+    let end = "range = [2.7, 5]\nleast = { p = [0.2, 3] }\nwithout = \"motion\"\nalong = { q = [1, 6] }";
+    let found = answers(model, &[ON_ISOLA.to_string(), question("end", end)].concat());
+    answered(&found, "end");
+    let [short] = &found.shortfalls[..] else { panic!("{:?}", found.shortfalls) };
+    assert!(short.about == "end" && short.what.contains("lower end of the range of l"), "{}", short.what);
+    assert!(found.branch("end/along").is_none());
+}

@@ -13,8 +13,8 @@ use foldline::special::on_levels::Level;
 use foldline::special::quantity::Quantity;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 9] =
-    ["name", "description", "of", "range", "least", "greatest", "without", "below", "max-points"];
+pub(super) const KEYS: [&str; 10] =
+    ["name", "description", "of", "range", "least", "greatest", "without", "below", "along", "max-points"];
 
 /// Reads the design questions; `taken` are the names in use.
 pub(super) fn read(
@@ -37,7 +37,16 @@ pub(super) fn read(
         let range = base.as_ref().and_then(|base| own_range(walk, table, base, model));
         let varied = varied(walk, &item, model, base.as_ref().map(|base| base.free));
         let wanted = wanted(walk, &item, model);
+        let along = table.get("along").map(|value| {
+            let taken = [base.as_ref().map(|base| base.free), varied.map(|(_, vary, _)| vary)];
+            along(walk, value, model, taken)
+        });
         let max_points = max_points(walk, &item);
+        let along = match along {
+            Some(None) => continue,
+            Some(found) => found,
+            None => None,
+        };
         let (Some(name), Some(base), Some(range), Some((greatest, vary, within)), Some(wanted)) =
             (name, base, range, varied, wanted)
         else {
@@ -59,6 +68,7 @@ pub(super) fn read(
             within,
             greatest,
             wanted,
+            along,
             max_points,
         });
     }
@@ -162,6 +172,32 @@ fn varied(walk: &mut Walk, item: &Item, model: &Model, free: Option<usize>) -> O
         return None;
     }
     Some((greatest, index, range(walk, ends, &model.parameters[index].unit)?))
+}
+
+/// Reads the third parameter and its range; `None` after a mistake.
+fn along(
+    walk: &mut Walk,
+    value: &Value,
+    model: &Model,
+    taken: [Option<usize>; 2],
+) -> Option<(usize, String, [f64; 2])> {
+    let table = walk.table(value, "`along`")?;
+    let mut entries = table.iter();
+    let (Some((name, ends)), None) = (entries.next(), entries.next()) else {
+        let hint = "write `along = { NAME = [smallest, largest] }`";
+        walk.report(value.span(), "`along` must name exactly one parameter", hint);
+        return None;
+    };
+    let Some(index) = model.parameter_index(name.get_ref()) else {
+        unknown_parameter(walk, name.span(), name.get_ref(), model);
+        return None;
+    };
+    if taken.contains(&Some(index)) {
+        let message = format!("`{}` is already free in this question", name.get_ref());
+        walk.report(name.span(), message, "name a third parameter");
+        return None;
+    }
+    Some((index, model.parameters[index].name.clone(), range(walk, ends, &model.parameters[index].unit)?))
 }
 
 /// Reads `without` or `below`.

@@ -270,7 +270,8 @@ impl Work<'_> {
     ) -> Option<(Branch, bool)> {
         let bounded = |(settings, sides): (Settings, [bool; 2])| {
             let bounds = plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
-            (Settings { bounds, ..settings }, sides)
+            let stability = settings.stability && !plan.holds.singular;
+            (Settings { bounds, stability, ..settings }, sides)
         };
         let grow = |holds: &Holds, settings: &Settings, sides, branch: &mut Branch, station: Option<Station>| {
             let system = System { holds: Some(holds), ..self.system.clone() };

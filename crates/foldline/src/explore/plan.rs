@@ -142,6 +142,9 @@ pub struct Holds {
     pub others: Vec<(usize, Option<[f64; 2]>)>,
     /// The quantities. A value that is NaN stands for that of the start.
     pub levels: Vec<Level>,
+    /// True if, in place of quantities, the singular points of branches over the second of the further parameters are
+    /// followed, such as the centres of isolas.
+    pub singular: bool,
     /// Value of the parent's parameter next to which the start is sought, where several points of the parent have the
     /// values of the quantities.
     pub near: Option<f64>,
@@ -279,6 +282,8 @@ pub struct DesignPlan {
     pub greatest: bool,
     /// The condition.
     pub wanted: Wanted,
+    /// A third parameter along which an extremum inside the range is followed: its index, its name and its range.
+    pub along: Option<(usize, String, [f64; 2])>,
     /// Limit on the number of points of each run.
     pub max_points: usize,
 }

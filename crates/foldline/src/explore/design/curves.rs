@@ -91,7 +91,7 @@ impl Search<'_> {
                 let holds = Holds {
                     others: vec![(self.design.vary, Some(self.design.within))],
                     levels: vec![level.clone()],
-                    near: None,
+                    ..Holds::default()
                 };
                 marks.push(Mark::peak(vary));
                 let plan = BranchPlan {
@@ -168,7 +168,7 @@ impl Search<'_> {
         let off = |point: &Point| level.quantity.on(point, self.system.field).unwrap_or(f64::NAN) - level.value;
         let settings = self.settings([f64::NEG_INFINITY, f64::INFINITY]);
         // The branch's parameter is solved for, the design parameter fixed.
-        let holds = Holds { others: vec![(self.design.free, None)], levels: vec![level.clone()], near: None };
+        let holds = Holds { others: vec![(self.design.free, None)], levels: vec![level.clone()], ..Holds::default() };
         let plan = BranchPlan {
             name: self.design.name.clone(),
             start: Start::Seed(0),

@@ -26,6 +26,7 @@
 //! **Fails when** the part to be avoided ends at something that is not followed in two parameters; the answer then
 //! carries the reason.
 
+mod along;
 mod check;
 mod curves;
 mod lines;

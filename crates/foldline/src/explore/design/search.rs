@@ -134,7 +134,9 @@ impl<'s> Search<'s> {
         if best.is_none() && self.reasons.is_empty() {
             self.reasons.push(self.nothing());
         }
-        best.map(|candidate| self.stated(&candidate))
+        let best = best?;
+        self.follow_along(&best);
+        Some(self.stated(&best))
     }
 
     /// Sentence for a search that met no boundary.
