@@ -507,6 +507,9 @@ pub struct Plot {
     /// Vertical axis, as for --x [default: the maximum of the first output]
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
+    /// Draw only this branch, or the legs of this homotopy; can be repeated
+    #[arg(long, value_name = "NAME")]
+    pub branch: Vec<String>,
     /// Draw the two-parameter curves in their plane instead of the branches
     #[arg(long, conflicts_with_all = ["uncertainty", "tornado"])]
     pub curves: bool,

@@ -220,3 +220,26 @@ fn an_answer_at_the_end_of_the_range_is_not_followed_further_and_says_so() {
     assert!(short.about == "end" && short.what.contains("lower end of the range of l"), "{}", short.what);
     assert!(found.branch("end/along").is_none());
 }
+
+/// The same questions asked with half of the steps done before; the answers and branches must be the same.
+#[test]
+fn a_run_that_was_interrupted_gives_the_same_answers() {
+    let study = [
+        ON_ISOLA.to_string(),
+        question("a", "least = { p = [0.2, 3] }\nwithout = \"stable motion\""),
+        question("b2", "least = { p = [0.2, 3] }\nbelow = { x_max = 2.9 }"),
+    ]
+    .concat();
+    let whole = answers(ISOLA, &study);
+    let parsed = parse_study(&format!("model = \"m\"\n{study}"), "study", ISOLA, "model").unwrap();
+    let half = Diagram {
+        branches: whole.branches[..whole.branches.len() / 2].to_vec(),
+        designs: whole.designs[..1].to_vec(),
+        ..Diagram::default()
+    };
+    let again = explore::run(&System::of_plan(&parsed.model, &parsed.plan), &parsed.plan, 2, half, &Unobserved);
+    assert_eq!(again.designs, whole.designs);
+    let names =
+        |diagram: &Diagram| diagram.branches.iter().map(|b| (b.name.clone(), b.points.len())).collect::<Vec<_>>();
+    assert_eq!(names(&again), names(&whole));
+}
