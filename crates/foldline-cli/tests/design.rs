@@ -243,3 +243,51 @@ fn a_run_that_was_interrupted_gives_the_same_answers() {
         |diagram: &Diagram| diagram.branches.iter().map(|b| (b.name.clone(), b.points.len())).collect::<Vec<_>>();
     assert_eq!(names(&again), names(&whole));
 }
+
+/// Indices of the parameters of the rotor.
+const ZETA: usize = 2;
+const EPSILON: usize = 3;
+const CUBIC: &str = "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nparameters = { Omega = 5, kappa = 0 }\n\
+    [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+const CONTACT: &str = "[[seed]]\nname = \"s\"\nattractor = \"3:1\"\nparameters = { Omega = 5, kappa = 1 }\nsamples = 48\n\
+    [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+
+/// Limits of the damping at given speeds, .0678 for the single loop of the cubic rotor at Omega = 5 and .1144 for the double
+/// loop with contact at Omega = 3.6: an independent continuation of the folds, stated to 2e-4.
+#[test]
+fn damping_limits_of_the_rotor_agree_with_an_independent_continuation() {
+    let model = include_str!("../../../models/overhung-rotor.toml");
+    let least = "least = { zeta = [0.005, 0.5] }\nwithout = \"motion\"";
+    let cubic =
+        answers(model, &[CUBIC.to_string(), question("up to 5", &format!("range = [0.5, 5]\n{least}"))].concat());
+    let own = answered(&cubic, "up to 5");
+    assert!((own.value - 0.0678).abs() < 2e-4, "{}", own.value);
+    assert_eq!((own.binds, own.kind), (Binds::UpperEnd, Kind::Fold));
+    let text = [
+        CONTACT.to_string(),
+        question("up to 3.6", &format!("range = [0.5, 3.6]\n{least}")),
+        question("any", &format!("{least}\nalong = {{ epsilon = [0.3, 0.4] }}")),
+    ]
+    .concat();
+    let contact = answers(model, &text);
+    let own = answered(&contact, "up to 3.6");
+    assert!((own.value - 0.1144).abs() < 2e-4, "{}", own.value);
+    assert_eq!(own.binds, Binds::UpperEnd);
+    let any = answered(&contact, "any");
+    assert_eq!(any.binds, Binds::Inside);
+    // The errors are those of the numbers: with a sharper tolerance the answers move by less.
+    let sharp = answers(model, &format!("tolerance = 1e-8\n{text}"));
+    for name in ["up to 3.6", "any"] {
+        let [rough, fine] = [&contact, &sharp].map(|found| answered(found, name));
+        let off = (rough.value - fine.value).abs();
+        assert!(off <= rough.error + fine.error, "{name}: {off:e} against {:e} and {:e}", rough.error, fine.error);
+    }
+    // The boundary in (epsilon, zeta), asked for at another unbalance: the same point from two sides.
+    let boundary = contact.branch("any/along").unwrap();
+    let end = boundary.points.last().unwrap();
+    assert!((end.parameters[EPSILON] - 0.4).abs() < 1e-9);
+    let moved = CONTACT.replace("kappa = 1 }", "kappa = 1, epsilon = 0.4 }");
+    let other = answers(model, &[moved, question("any", least)].concat());
+    let there = answered(&other, "any");
+    assert!((there.value - end.parameters[ZETA]).abs() < 1e-6, "{} {:?}", there.value, end.parameters);
+}
