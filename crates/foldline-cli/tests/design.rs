@@ -19,7 +19,7 @@ const ON_HILLS: &str = "[[seed]]\nname = \"s\"\nstate = { x = 1 }\n\
 const HOPF: &str = "name = \"rest\"\n[parameters]\nl = 2\np = 0.1\n[states]\n\
     x = \"(p - 1 + (l - 2)^2)*x - y - x*(x^2 + y^2)\"\ny = \"(p - 1 + (l - 2)^2)*y + x - y*(x^2 + y^2)\"\n";
 /// x'' + 2ζx' + x = cos Ωt.
-const LINEAR: &str = "name = \"linear\"\n[parameters]\nOmega = 0.5\nzeta = 0.1\n[forcing]\nfrequency = \"Omega\"\n\
+const LINEAR: &str = "name = \"linear\"\n[parameters]\nOmega = 0.5\nzeta = 0.05\n[forcing]\nfrequency = \"Omega\"\n\
     [states]\nx = \"v\"\nv = \"-2*zeta*v - x + cos(Omega*t)\"\n";
 
 fn answers(model: &str, study: &str) -> Diagram {
