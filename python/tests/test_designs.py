@@ -33,7 +33,7 @@ without = "motion"
 
 
 def test_answers_have_values_errors_and_reasons():
-    diagram = foldline.run(STUDY, model=MODEL) if hasattr(foldline, "run") else MODEL.run(STUDY)
+    diagram = foldline.run(STUDY, MODEL)
     inside, narrow = diagram.designs["inside"], diagram.designs["narrow"]
     assert abs(inside.value - 1) <= inside.error < 1e-6 and inside.answered and not inside.reasons
     assert inside.at == pytest.approx(2, abs=1e-3) and inside.binds == "inside" and inside.vary == "p"

@@ -211,7 +211,8 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
     let diagram = ordered(run.diagram, &study.plan);
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
-    let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
+    let designs = diagram.designs.iter().map(|own| &own.name);
+    let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).chain(designs).collect();
     let mut notes = run.notes;
     notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
     // Remarks on one subject stay in the order in which they were made.

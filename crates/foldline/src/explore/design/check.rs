@@ -13,6 +13,16 @@ const CLEARLY: f64 = 5.0;
 /// Positions in the extent of the inner diagram at which lines start.
 const INNER: [f64; 3] = [0.25, 0.5, 0.75];
 
+/// What lies on the inner side of a candidate.
+enum Inner {
+    /// A diagram with solutions to be avoided.
+    Avoided(Branch),
+    /// A diagram without them.
+    Nothing,
+    /// It could not be computed, for this reason.
+    Unknown(String),
+}
+
 impl Search<'_> {
     /// Returns the farthest candidate that has solutions to be avoided on its inner side, and special points found beyond
     /// it. `start` is the value of the design parameter on the branch of the question.
@@ -36,7 +46,19 @@ impl Search<'_> {
                 _ => format!("-{}", 1 + number + 10 * round),
             };
             let distance = BESIDE * (value - start);
-            let Some(inner) = self.inside(&candidate, value - distance, &tail) else { continue };
+            let inner = match self.inside(&candidate, value - distance, &tail) {
+                Inner::Avoided(inner) => inner,
+                Inner::Nothing => continue,
+                Inner::Unknown(why) => {
+                    let [free, p] = &self.design.names;
+                    let [at, value] = self.at(&candidate.point).map(Shown);
+                    self.reasons.push(format!(
+                        "the inner side of {} at {free} = {at:.6}, {p} = {value:.9} could not be computed: {why}",
+                        candidate.curve
+                    ));
+                    return Some((candidate, Vec::new()));
+                }
+            };
             let clear = CLEARLY * candidate.error * (self.system.unit(self.design.vary) + value.abs());
             let beyond = value + clear.copysign(distance);
             let more = self.outside(&candidate, &inner, value + distance, beyond, &tail);
@@ -45,12 +67,18 @@ impl Search<'_> {
         None
     }
 
-    /// The diagram on the inner side of a candidate; `None` if it has no solution to be avoided.
-    fn inside(&mut self, candidate: &Candidate, value: f64, tail: &str) -> Option<Branch> {
-        let start = self.beside(candidate)?;
+    /// The diagram on the inner side of a candidate.
+    fn inside(&mut self, candidate: &Candidate, value: f64, tail: &str) -> Inner {
+        let start = match self.beside(candidate) {
+            Ok(start) => start,
+            Err(why) => return Inner::Unknown(why),
+        };
         let line = self.line(&start, &format!("inwards{tail}"), value);
-        let end = line.points.iter().find(|point| self.reaches(self.at(point)[1], value))?.clone();
-        let end = self.whole(&line, &end)?;
+        let end = line.points.iter().find(|point| self.reaches(self.at(point)[1], value)).cloned();
+        let Some(end) = end.and_then(|end| self.whole(&line, &end)) else {
+            let ends: Vec<String> = line.ends.iter().flatten().map(|end| end.brief()).collect();
+            return Inner::Unknown(format!("{}: {}", line.name, ends.join("; ")));
+        };
         let diagram = self.diagram(&end, &format!("inside{tail}"), &line.name);
         let there: Vec<f64> = diagram
             .points
@@ -66,7 +94,7 @@ impl Search<'_> {
                 "{curve} at {:.9}: nothing to be avoided beside it",
                 Shown(self.at(&candidate.point)[1])
             ));
-            return None;
+            return Inner::Nothing;
         }
         let what = match &self.design.wanted {
             Wanted::NoMotion => "the motion exists".to_string(),
@@ -76,18 +104,18 @@ impl Search<'_> {
         let [free, p] = self.design.names.clone();
         let names = format!("at {p} = {:.6} {what} from {free} = {:.6}", Shown(value), Shown(low));
         self.check(format!("{names} to {:.6} ({})", Shown(high), diagram.name));
-        Some(diagram)
+        Inner::Avoided(diagram)
     }
 
     /// The point of a candidate, or for folds a solution beside it at the same value of the branch's parameter.
-    fn beside(&mut self, candidate: &Candidate) -> Option<Point> {
+    fn beside(&self, candidate: &Candidate) -> Result<Point, String> {
         if candidate.kind != Kind::Fold {
-            return Some(candidate.point.clone());
+            return Ok(candidate.point.clone());
         }
         let settings = self.settings([f64::NEG_INFINITY, f64::INFINITY]);
         let (vary, degree) = (self.design.vary, self.plan.degree);
         let mut problem = growth::problem_of(self.system, vary, degree, &candidate.point, false);
-        growth::beside(&mut *problem, &settings, &candidate.point).ok()
+        growth::beside(&mut *problem, &settings, &candidate.point).map_err(|why| why.to_string())
     }
 
     /// Follows what may lie beyond a candidate; returns the special points found farther than `beyond`.
