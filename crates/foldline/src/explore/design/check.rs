@@ -3,7 +3,7 @@
 use super::super::growth;
 use super::super::plan::Wanted;
 use super::search::{Candidate, Search, Seed};
-use crate::diagram::{Branch, Kind, Point, Shown};
+use crate::diagram::{Branch, Kind, Point, Shown, SpecialPoint};
 
 /// Distance of the diagrams from the candidate, as a share of its distance from the branch of the question: visible in a
 /// picture, and close enough to tell which motion it is.
@@ -80,13 +80,12 @@ impl Search<'_> {
             return Inner::Unknown(format!("{}: {}", line.name, ends.join("; ")));
         };
         let diagram = self.diagram(&end, &format!("inside{tail}"), &line.name);
-        let there: Vec<f64> = diagram
-            .points
-            .iter()
-            .chain(diagram.special.iter().map(|special| &special.point))
-            .filter(|point| self.in_range(point) && self.avoided(point))
-            .map(|point| self.at(point)[0])
-            .collect();
+        let avoided = diagram.points.iter().filter(|point| self.avoided(point));
+        // A mark lies at the bound up to rounding.
+        let own = |special: &&SpecialPoint| special.kind == Kind::Mark || self.avoided(&special.point);
+        let ends = diagram.special.iter().filter(own).map(|special| &special.point);
+        let there: Vec<f64> =
+            avoided.chain(ends).filter(|point| self.in_range(point)).map(|point| self.at(point)[0]).collect();
         let (low, high) = there.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(*v), b.max(*v)));
         if low > high {
             let curve = &candidate.curve;

@@ -78,10 +78,7 @@ impl Search<'_> {
             true => ([value, target], [false, true]),
             false => ([target, value], [true, false]),
         };
-        let marks = match &self.design.wanted {
-            Wanted::Below(level) => vec![Mark::at(level.quantity, level.value, false)],
-            _ => Vec::new(),
-        };
+        let marks = self.bound();
         let origin = Origin::Switch { parent: self.design.of.clone(), kind: Kind::Mark, parameter: self.at(start)[0] };
         self.leg(name, self.design.vary, range, sides, &marks, origin, start)
     }
@@ -89,7 +86,15 @@ impl Search<'_> {
     /// Follows the branch of `start` in its own parameter over the range.
     pub(super) fn diagram(&mut self, start: &Point, name: &str, line: &str) -> Branch {
         let origin = Origin::EndOf(line.to_string());
-        self.leg(name, self.design.free, self.design.range, [true, true], &[], origin, start)
+        self.leg(name, self.design.free, self.design.range, [true, true], &self.bound(), origin, start)
+    }
+
+    /// Mark of the bound, if the question has one.
+    fn bound(&self) -> Vec<Mark> {
+        match &self.design.wanted {
+            Wanted::Below(level) => vec![Mark::at(level.quantity, level.value, false)],
+            Wanted::NoMotion | Wanted::NotStable => Vec::new(),
+        }
     }
 
     /// Follows one run, or takes it from an earlier attempt.
