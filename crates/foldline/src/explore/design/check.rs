@@ -16,7 +16,7 @@ const INNER: [f64; 3] = [0.25, 0.5, 0.75];
 /// What lies on the inner side of a candidate.
 enum Inner {
     /// A diagram with solutions to be avoided.
-    Avoided(Branch),
+    Avoided(Box<Branch>),
     /// A diagram without them.
     Nothing,
     /// It could not be computed, for this reason.
@@ -103,7 +103,7 @@ impl Search<'_> {
         let [free, p] = self.design.names.clone();
         let names = format!("at {p} = {:.6} {what} from {free} = {:.6}", Shown(value), Shown(low));
         self.check(format!("{names} to {:.6} ({})", Shown(high), diagram.name));
-        Inner::Avoided(diagram)
+        Inner::Avoided(Box::new(diagram))
     }
 
     /// The point of a candidate, or for folds a solution beside it at the same value of the branch's parameter.
