@@ -221,7 +221,7 @@ fn an_answer_at_the_end_of_the_range_is_not_followed_further_and_says_so() {
     assert!(found.branch("end/along").is_none());
 }
 
-/// The same questions asked with half of the steps done before; the answers and branches must be the same.
+/// A run with half of its branches done before has the answers and branches of an uninterrupted one.
 #[test]
 fn a_run_that_was_interrupted_gives_the_same_answers() {
     let study = [

@@ -13,7 +13,7 @@ const CLEARLY: f64 = 5.0;
 /// Positions in the extent of the inner diagram at which lines start.
 const INNER: [f64; 3] = [0.25, 0.5, 0.75];
 
-/// What lies on the inner side of a candidate.
+/// Diagram on the inner side of a candidate.
 enum Inner {
     /// A diagram with solutions to be avoided.
     Avoided(Box<Branch>),

@@ -13,7 +13,7 @@ const BEYOND: f64 = 0.01;
 /// Difference of parameters, relative to size, within which a special point lies on a curve: far above the errors, far below
 /// the distance of curves.
 const ON_CURVE: f64 = 1e-4;
-/// The same for the ranges of states, which change faster next to a fold.
+/// Limit likewise for the ranges of states, which change faster next to a fold.
 const ALIKE: f64 = 1e-2;
 
 impl Search<'_> {
