@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from . import _native
 from ._arguments import suggestion
 from ._branch import Branch, SpecialPoints, shown_in
+from ._designs import Design
 from ._errors import NoSolution
 from ._model import Model
 from ._responses import Responses, Survey, Sweep, made
@@ -91,6 +92,11 @@ class Diagram:
     def responses(self) -> dict[str, Survey | Sweep]:
         """The surveys and sweeps of the study by name: tables of columns, arrays of shape (responses,)."""
         return {own["name"]: made(self, own) for own in self._native.responses()}
+
+    @cached_property
+    def designs(self) -> dict[str, Design]:
+        """Answers to the design questions of the study by name."""
+        return {own["name"]: Design(**{**own, "range": tuple(own["range"])}) for own in self._native.designs()}
 
     @property
     def sweeps(self) -> list[Sweep]:

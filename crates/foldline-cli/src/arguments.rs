@@ -389,6 +389,9 @@ pub struct Table {
     /// Results of surveys and sweeps
     #[arg(long, group = "what")]
     pub responses: bool,
+    /// Answers to design questions
+    #[arg(long, group = "what")]
+    pub designs: bool,
     /// Derivatives of the special points with respect to every parameter
     #[arg(long, group = "what")]
     pub sensitivities: bool,
@@ -425,6 +428,7 @@ pub enum What {
     Points,
     Branches,
     Responses,
+    Designs,
     Notes,
     Sensitivities,
     Uncertainty,
@@ -436,6 +440,7 @@ impl Table {
             (self.points, What::Points),
             (self.branches, What::Branches),
             (self.responses, What::Responses),
+            (self.designs, What::Designs),
             (self.notes, What::Notes),
             (self.sensitivities, What::Sensitivities),
             (self.uncertainty, What::Uncertainty),
@@ -502,6 +507,9 @@ pub struct Plot {
     /// Vertical axis, as for --x [default: the maximum of the first output]
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
+    /// Draw only this branch, or the legs of this homotopy; can be repeated
+    #[arg(long, value_name = "NAME")]
+    pub branch: Vec<String>,
     /// Draw the two-parameter curves in their plane instead of the branches
     #[arg(long, conflicts_with_all = ["uncertainty", "tornado"])]
     pub curves: bool,

@@ -3,7 +3,7 @@
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
-use crate::table::{Run, conversion, read};
+use crate::table::{Run, asked_for, conversion, read};
 use crate::tornado;
 use crate::verbosity::report;
 use foldline::contract::VectorField;
@@ -15,6 +15,7 @@ use foldline::sensitivity::listed::uncertainties;
 use foldline_plot::quantity::{default_x, default_y, label};
 use foldline_plot::responses::value;
 use foldline_plot::{Picture, Quantity, deviation_layers, pdf, png, svg};
+use foldline_store::order::is_run;
 use foldline_store::run_file::Part;
 use std::path::Path;
 
@@ -54,6 +55,7 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         quantity.transpose()
     };
     let (x, y) = (axis("x", &typed.x)?, axis("y", &typed.y)?);
+    selected(&mut diagram, &typed.branch)?;
     let (diagram, plane) = shown(diagram, typed.curves, [x, y])?;
     let picture = Picture {
         x: x.or(plane.map(|[first, _]| Quantity::Parameter(first))),
@@ -115,6 +117,24 @@ fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Re
             report(format_args!("note: not drawn, because simulations have no \"{axis}\": {names}"))?;
         }
     }
+    Ok(())
+}
+
+/// Keeps the branches of the given names. Without names, leaves out the runs for design questions that are not diagrams of
+/// the branch in question: lines at fixed speeds and solutions with a bound.
+fn selected(diagram: &mut Diagram, names: &[String]) -> Result<(), Failure> {
+    if names.is_empty() {
+        let designs = std::mem::take(&mut diagram.designs);
+        let aside = |branch: &Branch| {
+            let own = designs.iter().find(|design| is_run(&branch.name, &design.name));
+            own.is_some_and(|design| branch.held.is_none() && (branch.free != design.free || !branch.also.is_empty()))
+        };
+        diagram.branches.retain(|branch| !aside(branch));
+        diagram.designs = designs;
+        return Ok(());
+    }
+    let kept: Vec<_> = names.iter().map(|name| asked_for(diagram, Some(name))).collect::<Result<_, Failure>>()?;
+    diagram.branches.retain(|branch| kept.iter().any(|kept| kept(branch)));
     Ok(())
 }
 

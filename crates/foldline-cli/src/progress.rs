@@ -79,6 +79,10 @@ impl Progress {
             Event::Note(branch, note) | Event::Short(branch, note) => self.say(&format!("{branch}: {note}")),
             Event::Visited(name, value, done, of) => self.visited(name, value, done, of),
             Event::Responses(set) => self.responses(set),
+            Event::Design(design) => {
+                let how = if design.answered() { "answered" } else { "not answered" };
+                self.say(&format!("{}: {how}", design.name));
+            }
         }
     }
 

@@ -39,6 +39,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "boundary-value-problems",
         "connecting-orbits",
         "contact",
+        "design",
         "friction",
         "endings",
         "exploring",

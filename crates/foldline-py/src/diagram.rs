@@ -184,6 +184,11 @@ impl Diagram {
         let variables = self.study.model.dim() + self.study.model.output_count();
         self.diagram.responses.iter().map(|set| responses(py, set, variables)).collect()
     }
+
+    /// Answers to design questions, one table each.
+    fn designs<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.diagram.designs.iter().map(|design| answer(py, design, &self.study.model)).collect()
+    }
 }
 
 type SpecialRow = (&'static str, usize, usize, f64, (Vec<f64>, Vec<f64>), Option<&'static str>, String);
@@ -261,6 +266,34 @@ fn column<'py>(
         "error" if special => numbers(py, branch.special.iter().map(|s| s.error)),
         _ => Err(failure::internal(py, format!("there is no column {name}"))),
     }
+}
+
+/// Parts of the answer to a design question.
+fn answer<'py>(
+    py: Python<'py>,
+    design: &diagram::Design,
+    model: &foldline::model::Model,
+) -> PyResult<Bound<'py, PyDict>> {
+    let name = |index: usize| model.parameters.get(index).map_or("?", |own| own.name.as_str());
+    let (parts, own) = (PyDict::new(py), design.answer.as_ref());
+    let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    parts.set_item("name", &design.name)?;
+    parts.set_item("of", &design.of)?;
+    parts.set_item("free", name(design.free))?;
+    parts.set_item("vary", name(design.vary))?;
+    parts.set_item("range", design.range)?;
+    parts.set_item("greatest", design.greatest)?;
+    parts.set_item("wanted", &design.wanted)?;
+    parts.set_item("value", number(own.map(|own| own.value)))?;
+    parts.set_item("error", number(own.map(|own| own.error)))?;
+    parts.set_item("at", number(own.map(|own| own.at)))?;
+    parts.set_item("binds", own.map(|own| own.binds.name()))?;
+    parts.set_item("boundary", own.map(|own| own.kind.name()))?;
+    parts.set_item("curve", own.map(|own| own.curve.clone()))?;
+    parts.set_item("answered", design.answered())?;
+    parts.set_item("reasons", &design.reasons)?;
+    parts.set_item("checks", &design.checks)?;
+    Ok(parts)
 }
 
 /// Columns of a survey or sweep of a model with `variables` states and outputs.

@@ -17,6 +17,7 @@ pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, S
     notes.iter().for_each(|(about, note)| tell(Event::Note(about, note)));
     diagram.shortfalls.iter().for_each(|own| tell(Event::Short(&own.about, &own.what)));
     diagram.responses.iter().for_each(|set| tell(Event::Responses(set)));
+    diagram.designs.iter().for_each(|design| tell(Event::Design(design)));
     recorder.complete()
 }
 

@@ -48,6 +48,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        designs: Vec::new(),
         record: Vec::new(),
     };
     let system = System::new(&field);

@@ -35,7 +35,7 @@ const PLACES: [(&str, &[&str], &str); 3] = [
     ),
     (
         "the model",
-        &["seed", "branch", "curve", "survey", "sweep", "explore", "homotopy"],
+        &["seed", "branch", "curve", "survey", "sweep", "explore", "homotopy", "design"],
         "this belongs to a study, a second file, which names this one with `model = \"FILE\"`",
     ),
 ];

@@ -53,14 +53,27 @@ fn is_finding(name: &str, exploration: &str) -> bool {
         .is_some_and(|(kind, number)| !kind.contains('/') && number.parse::<usize>().is_ok())
 }
 
+/// True if the name denotes a branch that was followed for a design question: `NAME/line-3`.
+pub fn is_run(name: &str, design: &str) -> bool {
+    name.strip_prefix(design).is_some_and(|rest| rest.starts_with('/'))
+}
+
 /// Sorts the branches and responses of a diagram into an order that does not depend on the scheduling of the threads.
 ///
 /// The branches of the study come in the order of its [`names`]. Each is followed by its child branches, sorted by
 /// parameter, and then by the two-parameter curves that begin on it. Homotopy runs and findings of an exploration stay
-/// in the order in which they were computed. Surveys and then sweeps come in the order of the study.
+/// in the order in which they were computed. Branches followed for design questions come last, question by question.
+/// Surveys and then sweeps come in the order of the study.
 pub fn ordered(diagram: Diagram, plan: &Plan) -> Diagram {
     let simulated = || plan.surveys.iter().map(|own| &own.name).chain(plan.sweeps.iter().map(|own| &own.name));
-    let mut diagram = branches_ordered(diagram, &names(plan));
+    let (runs, others): (Vec<Branch>, Vec<Branch>) =
+        diagram.branches.into_iter().partition(|branch| plan.designs.iter().any(|own| is_run(&branch.name, &own.name)));
+    let mut diagram = branches_ordered(Diagram { branches: others, ..diagram }, &names(plan));
+    for design in &plan.designs {
+        diagram.branches.extend(runs.iter().filter(|branch| is_run(&branch.name, &design.name)).cloned());
+    }
+    let place = |name: &str| plan.designs.iter().position(|own| own.name == name).unwrap_or(usize::MAX);
+    diagram.designs.sort_by_key(|own| place(&own.name));
     diagram.responses.sort_by_key(|set| simulated().position(|name| *name == set.name).unwrap_or(usize::MAX));
     diagram
 }

@@ -1,8 +1,8 @@
 //! Requests of a study that were not fulfilled.
 
-use crate::order::leg;
+use crate::order::{is_run, leg};
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall, Shown};
-use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
+use foldline::explore::{DesignPlan, HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
 /// Returns one message per request of the study that was not fulfilled. Further lines of a message give causes and
@@ -19,9 +19,12 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
         }
     }
     lines.extend(plan.sweeps.iter().filter_map(|sweep| cut_off(diagram, sweep, model)));
+    lines.extend(plan.designs.iter().filter_map(|design| unanswered(diagram, design, model)));
     let targets = targets(plan);
     for branch in &diagram.branches {
-        let is_leg = plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some());
+        // Answers to design questions say what their runs leave open.
+        let is_run = plan.designs.iter().any(|own| is_run(&branch.name, &own.name));
+        let is_leg = is_run || plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some());
         if !is_leg {
             let target = targets.iter().find(|(name, _)| **name == branch.name).and_then(|(_, target)| *target);
             lines.extend(ended(branch, target, model));
@@ -64,6 +67,23 @@ fn not_arrived(diagram: &Diagram, homotopy: &HomotopyPlan, model: &Model) -> Opt
         true => None,
         false => Some(format!("{name}: it did not reach {}", place(targets, model))),
     }
+}
+
+/// Message on a design question without an answer, or with one that is only a bound.
+fn unanswered(diagram: &Diagram, design: &DesignPlan, model: &Model) -> Option<String> {
+    let Some(found) = diagram.design(&design.name) else { return Some(format!("{}: it is unfinished", design.name)) };
+    if found.answered() {
+        return None;
+    }
+    let p = model.parameters.get(found.vary).map_or("?", |own| own.name.as_str());
+    let what = match &found.answer {
+        Some(answer) => {
+            let side = if found.greatest { "most" } else { "least" };
+            format!("it is not answered; the value of {p} is at {side} {:.6}", Shown(answer.value))
+        }
+        None => "it is not answered".into(),
+    };
+    Some(format!("{}: {what}\n{}", design.name, found.reasons.join("\n")))
 }
 
 /// Message on a sweep whose trajectory escaped before the last value.

@@ -134,7 +134,7 @@ fn diagram() -> Diagram {
         Shortfall { about: "main".into(), what: "hopf 0.15 of main: no bifurcating branch found".into() },
         Shortfall { about: "third".into(), what: "two\nlines".into() },
     ];
-    Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec(), shortfalls }
+    Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec(), shortfalls, ..Diagram::default() }
 }
 
 fn record(diagram: &Diagram, observer: &dyn Observer) {

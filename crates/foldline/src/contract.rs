@@ -3,7 +3,7 @@
 //! **Idea.** The rest of the crate is written against these few object-safe traits. A model may therefore be text,
 //! traced code or native Rust, and a curve may consist of equilibria, cycles or solutions of a new kind of problem.
 
-use crate::diagram::{Branch, Cycle, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
+use crate::diagram::{Branch, Cycle, Design, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.
@@ -614,6 +614,8 @@ pub enum Event<'a> {
     Visited(&'a str, f64, usize, usize),
     /// A survey or sweep is complete.
     Responses(&'a Responses),
+    /// A design question is settled: answered, or not, with the reasons.
+    Design(&'a Design),
 }
 
 /// The observer's decision.

@@ -131,6 +131,15 @@ impl Conversion {
             let free = set.free;
             set.responses.iter_mut().for_each(|response| self.response(response, free));
         }
+        for design in &mut diagram.designs {
+            let (free, vary) = (design.free, design.vary);
+            design.range = design.range.map(|value| self.parameter(free, value));
+            if let Some(answer) = &mut design.answer {
+                answer.value = self.parameter(vary, answer.value);
+                answer.error = self.parameter(vary, answer.error);
+                answer.at = self.parameter(free, answer.at);
+            }
+        }
         diagram
     }
 

@@ -65,6 +65,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        designs: Vec::new(),
         record: Vec::new(),
     }
 }

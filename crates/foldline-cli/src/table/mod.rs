@@ -1,6 +1,7 @@
 //! `foldline table`: the results of a run.
 
 mod columns;
+mod designs;
 mod format;
 mod responses;
 mod sensitivity;
@@ -16,7 +17,7 @@ use foldline::explore::plan::Plan;
 use foldline::model::{Model, Spread};
 use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
-use foldline_store::order::{leg, ordered};
+use foldline_store::order::{is_run, leg, ordered};
 use foldline_store::run_file::{Part, load_part};
 use foldline_store::short;
 use foldline_store::study_file::parse_study_of_run;
@@ -84,7 +85,7 @@ pub enum Cell {
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let part = match typed.what() {
         What::Points | What::Branches => Part::Numbers,
-        What::Special | What::Responses | What::Notes => Part::Special,
+        What::Special | What::Responses | What::Designs | What::Notes => Part::Special,
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
     if typed.position.is_some() {
@@ -117,6 +118,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Branches => columns::branches(diagram, model, &kept),
         What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
+        What::Designs => designs::designs(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
     };
@@ -176,8 +178,13 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
-        let special = columns::special(diagram, model, &[], &|_| true);
+        // The runs for design questions are in `foldline table`.
+        let shown = |branch: &Branch| !diagram.designs.iter().any(|own| is_run(&branch.name, &own.name));
+        let special = columns::special(diagram, model, &[], &shown);
         if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
+    }
+    if !diagram.designs.is_empty() {
+        format::text(&designs::designs(diagram, model), &mut out)?;
     }
     if !diagram.responses.is_empty() {
         format::text(&responses::summary(diagram, model), &mut out)?;
@@ -204,7 +211,8 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
     let diagram = ordered(run.diagram, &study.plan);
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
-    let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
+    let designs = diagram.designs.iter().map(|own| &own.name);
+    let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).chain(designs).collect();
     let mut notes = run.notes;
     notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
     // Remarks on one subject stay in the order in which they were made.

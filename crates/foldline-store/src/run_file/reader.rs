@@ -255,6 +255,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         diagram.branches.push(branch);
     }
     diagram.responses = super::responses::load(connection, path)?;
+    diagram.designs = super::designs::load(connection, path)?;
     diagram.shortfalls = shortfalls(connection, path)?;
     Ok(diagram)
 }

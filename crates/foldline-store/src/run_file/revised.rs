@@ -145,8 +145,13 @@ fn remove(transaction: &Transaction, gone: &Added, study: &Study) -> rusqlite::R
         }
         transaction.execute("DELETE FROM notes WHERE branch = ?", [name])?;
     }
+    let designs = if exists("designs")? { named("designs", "design")? } else { Vec::new() };
+    for (number, name) in &designs {
+        transaction.execute("DELETE FROM designs WHERE design = ?", [number])?;
+        transaction.execute("DELETE FROM notes WHERE branch = ?", [name])?;
+    }
     if exists("shortfalls")? {
-        for (_, name) in branches.iter().chain(&sets) {
+        for (_, name) in branches.iter().chain(&sets).chain(&designs) {
             transaction.execute("DELETE FROM shortfalls WHERE about = ?", [name])?;
         }
     }

@@ -249,6 +249,7 @@ impl Recorder {
         };
         let columns = Columns::new(&study.model);
         responses::create(&connection, &study.model).map_err(failed)?;
+        super::designs::create(&connection).map_err(failed)?;
         connection.execute_batch(SHORTFALLS).map_err(failed)?;
         let special = [
             "branch",
@@ -443,6 +444,7 @@ impl Observer for Recorder {
             Event::Responses(set) => {
                 self.write(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown));
             }
+            Event::Design(design) => self.write(|state| super::designs::write(&state.connection, design)),
             Event::End(_) | Event::Visited(..) => {}
         }
         if self.failed.load(Ordering::Acquire) { Verdict::Stop } else { Verdict::Continue }

@@ -10,7 +10,7 @@ use foldline::explore::{BranchPlan, Plan, Switching};
 /// Requests that a study has beyond those of an earlier one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Added {
-    /// Names of branches, curves, homotopies, explorations, surveys and sweeps.
+    /// Names of branches, curves, homotopies, explorations, surveys, sweeps and design questions.
     pub items: Vec<String>,
     /// Branches that are switched to further on: the name of the parent, the kind of the special points, and the number
     /// of one of them if not all are meant.
@@ -44,6 +44,7 @@ pub fn added(old: &Study, new: &Study) -> Result<Added, String> {
         first("exploration", &a.explorations, &b.explorations, |own| &own.name, |x, y| x == y)?,
         first("survey", &a.surveys, &b.surveys, |own| &own.name, |x, y| x == y)?,
         first("sweep", &a.sweeps, &b.sweeps, |own| &own.name, |x, y| x == y)?,
+        first("design question", &a.designs, &b.designs, |own| &own.name, |x, y| x == y)?,
     ];
     found.items = more.concat();
     for (x, y) in a.branches.iter().zip(&b.branches) {

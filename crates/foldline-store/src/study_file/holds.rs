@@ -66,7 +66,7 @@ pub(super) fn read(walk: &mut Walk, item: &Item, model: &Model) -> Option<Held> 
     }
     let near = table.get("near").and_then(|value| walk.quantity(value, "`near`", ""));
     let others = frees[1..].iter().map(|index| (*index, None)).collect();
-    Some(Held { free: frees[0], holds: Holds { others, levels, near } })
+    Some(Held { free: frees[0], holds: Holds { others, levels, near, ..Holds::default() } })
 }
 
 /// Names of parameters for an example: those given, and more.

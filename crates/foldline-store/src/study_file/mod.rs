@@ -9,6 +9,7 @@
 mod append;
 mod branches;
 mod curves;
+mod designs;
 mod explorations;
 mod grown;
 mod holds;
@@ -73,7 +74,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 19] = [
+const ROOT_KEYS: [&str; 20] = [
     "model",
     "title",
     "description",
@@ -93,6 +94,7 @@ const ROOT_KEYS: [&str; 19] = [
     "explore",
     "survey",
     "sweep",
+    "design",
 ];
 
 /// Reads a study file and the model that it names. On failure, returns every mistake found.
@@ -201,7 +203,7 @@ pub fn is_study(text: &str) -> bool {
     if root.get_ref().contains_key("equations") {
         return false;
     }
-    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep"];
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design"];
     keys.iter().any(|key| root.get_ref().contains_key(*key))
 }
 
@@ -248,6 +250,9 @@ fn parse(
     let sweeps = responses::sweeps(&mut walk, &root, &ground, &seeds, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
     let explorations = explorations::read(&mut walk, &root, &model, &defaults, &taken);
+    let taken: Vec<&str> = taken.iter().copied().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
+    let taken: Vec<&str> = taken.into_iter().chain(explorations.iter().map(|e| e.name.as_str())).collect();
+    let designs = designs::read(&mut walk, &root, &ground, &explorations, &taken);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
         check_totals(&mut walk, &root, &model);
     }
@@ -272,6 +277,7 @@ fn parse(
         explorations,
         surveys,
         sweeps,
+        designs,
         record,
     };
     Ok(Study {
@@ -293,6 +299,7 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
     if model.conditions() == [0, 0] {
         return;
     }
+    designs::refuse(walk, root, "boundary-value problems");
     for key in ["explore", "survey", "sweep", "curve"] {
         let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
         let (message, hint) = match key {
@@ -324,6 +331,7 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
     if events == 0 {
         return;
     }
+    designs::refuse(walk, root, "models with events");
     let kinks = model.switch_count() - events;
     for (key, message, hint) in [
         (
@@ -521,7 +529,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed, branch, curve, homotopy, exploration, survey and sweep a name of its own",
+            "give every seed, branch, curve, homotopy, exploration, survey, sweep and design question a name of its own",
         );
     }
     Some(name)
@@ -569,5 +577,6 @@ mod tests {
         assert_eq!(keys("/$defs/explore/properties"), sorted(&explorations::KEYS));
         assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
         assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
+        assert_eq!(keys("/$defs/design/properties"), sorted(&designs::KEYS));
     }
 }

@@ -1,6 +1,7 @@
 //! Results as plain data: points, special points, branches, diagrams.
 
 mod cycle;
+mod design;
 mod number;
 mod record;
 mod response;
@@ -8,6 +9,7 @@ mod share;
 mod torus;
 
 pub use cycle::Cycle;
+pub use design::{Answer, Binds, Design};
 pub use number::Shown;
 pub use record::{Misfit, Record};
 pub use response::{Motion, Response, Responses, Search};
@@ -1026,6 +1028,8 @@ pub struct Diagram {
     pub branches: Vec<Branch>,
     /// Results of surveys and sweeps.
     pub responses: Vec<Responses>,
+    /// Answers to design questions.
+    pub designs: Vec<Design>,
     /// Requests that were not fulfilled, in addition to branches that ended short.
     pub shortfalls: Vec<Shortfall>,
 }
@@ -1043,6 +1047,11 @@ impl Diagram {
     /// Returns the branch of that name.
     pub fn branch(&self, name: &str) -> Option<&Branch> {
         self.branches.iter().find(|branch| branch.name == name)
+    }
+
+    /// Returns the answer to the design question of that name.
+    pub fn design(&self, name: &str) -> Option<&Design> {
+        self.designs.iter().find(|design| design.name == name)
     }
 
     /// Returns the responses of the survey or sweep of that name.

@@ -262,10 +262,16 @@ impl Work<'_> {
     }
 
     /// Follows a branch on which quantities are held, or resumes it.
-    fn held(&self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> Option<(Branch, bool)> {
+    pub(super) fn held(
+        &self,
+        plan: &BranchPlan,
+        origin: Origin,
+        start: Result<Point, String>,
+    ) -> Option<(Branch, bool)> {
         let bounded = |(settings, sides): (Settings, [bool; 2])| {
             let bounds = plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
-            (Settings { bounds, ..settings }, sides)
+            let stability = settings.stability && !plan.holds.singular;
+            (Settings { bounds, stability, ..settings }, sides)
         };
         let grow = |holds: &Holds, settings: &Settings, sides, branch: &mut Branch, station: Option<Station>| {
             let system = System { holds: Some(holds), ..self.system.clone() };
@@ -385,6 +391,7 @@ impl Work<'_> {
             // Branch switching checks whether a branch is known by comparison with the points of all.
             sparse: self.observer.stores()
                 && self.plan.explorations.is_empty()
+                && self.plan.designs.is_empty()
                 && !self.plan.starts_inside()
                 && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
         }

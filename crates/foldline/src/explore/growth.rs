@@ -7,7 +7,7 @@ use super::symmetry::{is_rotating_wave, rotation};
 use super::{System, connections, corner, impacts as beside_impacts, tori};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
-use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
+use crate::contract::{Condition, Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{
     Branch, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
 };
@@ -19,6 +19,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
+use crate::special::on_branch_points::OnBranchPoints;
 use crate::special::on_connections::{self, limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
@@ -92,8 +93,14 @@ impl Line {
         };
         let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
         let free = setting.freedom();
-        let condition = OnLevels::new(setting, &holds.levels, &sizes, &like);
-        Box::new(Held::new(surface, Box::new(condition), free))
+        let condition: Box<dyn Condition + 'a> = match &like {
+            Solution::Cycle(cycle) if holds.singular => {
+                Box::new(OnCycleBranchPoints::in_three_parameters(setting, cycle))
+            }
+            _ if holds.singular => Box::new(OnBranchPoints::in_three_parameters(setting)),
+            _ => Box::new(OnLevels::new(setting, &holds.levels, &sizes, &like)),
+        };
+        Box::new(Held::new(surface, condition, free))
     }
 
     /// Returns the problem of this curve through `point`, on the mesh of the point.
@@ -568,6 +575,7 @@ impl Growth<'_> {
         let neutral = system.holds.is_some() && last.neutral_multiplier().is_some();
         let symmetric = neutral || self.is_symmetric(branch, &last);
         let (monitors, collapses) = match branch.held {
+            None if system.holds.is_some_and(|holds| holds.singular) => (Vec::new(), Vec::new()),
             None if system.holds.is_some() => {
                 (special::monitors_of_held_quantities(branch.family, symmetric), collapses(branch, &system))
             }

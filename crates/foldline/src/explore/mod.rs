@@ -23,6 +23,7 @@
 //! | how is a family carried to other parameter values? | [`homotopy`] |
 //! | which point of a branch has given values? | `near` |
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
+//! | which value of a parameter keeps a motion away? | `design` |
 //! | what does simulation find? | [`responses`] |
 
 mod accounts;
@@ -39,6 +40,7 @@ mod counted;
 pub mod course;
 mod crossings;
 pub mod curves;
+mod design;
 mod diagnosis;
 mod direct;
 mod discovery;
@@ -83,8 +85,8 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource, Start,
-    SurveyPlan, SweepPlan, Switching,
+    AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource,
+    Start, SurveyPlan, SweepPlan, Switching, Wanted,
 };
 pub use seeds::{attractors, first_solution};
 pub use sizes::{scales_from, state_scales};
@@ -143,7 +145,9 @@ pub fn run_from(
         (1..jobs.min(families.len().max(seeds.count()))).for_each(|_| drop(scope.spawn(work)));
         work();
     });
-    let branches: Vec<Branch> = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
+    let mut branches: Vec<Branch> = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
     let responses = responses::simulate(system, plan, &seeds, jobs, &branches, &earlier, observer);
-    Diagram { branches, responses, shortfalls: observer.shortfalls() }
+    let (legs, designs) = design::answers(system, plan, jobs, &branches, &earlier, observer);
+    branches.extend(legs);
+    Diagram { branches, responses, designs, shortfalls: observer.shortfalls() }
 }

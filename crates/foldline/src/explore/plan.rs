@@ -142,6 +142,9 @@ pub struct Holds {
     pub others: Vec<(usize, Option<[f64; 2]>)>,
     /// The quantities. A value that is NaN stands for that of the start.
     pub levels: Vec<Level>,
+    /// True if, in place of quantities, the singular points of branches over the second of the further parameters are
+    /// followed, such as the centres of isolas.
+    pub singular: bool,
     /// Value of the parent's parameter next to which the start is sought, where several points of the parent have the
     /// values of the quantities.
     pub near: Option<f64>,
@@ -247,6 +250,44 @@ pub struct SweepPlan {
     pub values: Vec<f64>,
 }
 
+/// Condition that a design is to meet.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Wanted {
+    /// The branch has no solution.
+    NoMotion,
+    /// The branch has no stable solution.
+    NotStable,
+    /// A quantity stays below this level wherever the branch has a solution.
+    Below(Level),
+}
+
+/// A design question: the value of one parameter beyond which a condition is met over a range of another one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DesignPlan {
+    /// Unique name.
+    pub name: String,
+    /// Name of the branch: one of the plan, one switched to from it, or one found by an exploration.
+    pub of: String,
+    /// Names of the branch's parameter and of the design parameter, for messages.
+    pub names: [String; 2],
+    /// Index of the branch's parameter.
+    pub free: usize,
+    /// Its range.
+    pub range: [f64; 2],
+    /// Index of the design parameter.
+    pub vary: usize,
+    /// Range in which its value is sought.
+    pub within: [f64; 2],
+    /// True if the greatest value is sought, below which the condition is met.
+    pub greatest: bool,
+    /// The condition.
+    pub wanted: Wanted,
+    /// A third parameter along which an extremum inside the range is followed: its index, its name and its range.
+    pub along: Option<(usize, String, [f64; 2])>,
+    /// Limit on the number of points of each run.
+    pub max_points: usize,
+}
+
 /// All requests of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -272,6 +313,8 @@ pub struct Plan {
     pub surveys: Vec<SurveyPlan>,
     /// Stepped sweeps by simulation.
     pub sweeps: Vec<SweepPlan>,
+    /// Design questions.
+    pub designs: Vec<DesignPlan>,
     /// Further columns of tables and exports: names and quantities.
     pub record: Vec<(String, Quantity)>,
 }
@@ -299,6 +342,7 @@ impl Plan {
             explorations: Vec::new(),
             surveys: Vec::new(),
             sweeps: Vec::new(),
+            designs: Vec::new(),
             record: Vec::new(),
         }
     }

@@ -64,6 +64,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        designs: Vec::new(),
         record: Vec::new(),
     };
     let archive = Archive { keeps, points: Mutex::new(Vec::new()) };

@@ -33,6 +33,8 @@ use num_complex::Complex64;
 pub struct OnBranchPoints<'a> {
     setting: Setting<'a>,
     n: usize,
+    /// Number of unknowns before the free parameters: the states, and the amplitude of the unfolding.
+    before: usize,
     /// Direction of λ in the free parameters.
     across: Vec<f64>,
     /// d `[n]` and C `[2][n + 1]`.
@@ -52,6 +54,7 @@ impl<'a> OnBranchPoints<'a> {
         let scale = |i: usize| scales.get(i).copied().unwrap_or(1.0);
         OnBranchPoints {
             n,
+            before: n + 1,
             across: (0..setting.freedom()).map(|k| if k == 0 { 1.0 } else { 0.0 }).collect(),
             setting,
             left: (0..n).map(|k| scale(k) * (0.4 + (k as f64 * 1.3).sin())).collect(),
@@ -61,6 +64,13 @@ impl<'a> OnBranchPoints<'a> {
             state: Vec::new(),
             parameters: Vec::new(),
         }
+    }
+
+    /// Creates the condition for singular points of branches over the second of three free parameters, without an
+    /// unfolding: they form a curve.
+    pub fn in_three_parameters(setting: Setting<'a>) -> OnBranchPoints<'a> {
+        let own = OnBranchPoints::new(setting);
+        OnBranchPoints { before: own.n, across: vec![0.0, 1.0, 0.0], ..own }
     }
 
     fn batch(&self) -> Batch<'_> {
@@ -82,7 +92,7 @@ impl<'a> OnBranchPoints<'a> {
     fn evaluated(&mut self, u: &[f64], g: &mut [f64]) -> Option<()> {
         let (n, size) = (self.n, self.n + 2);
         self.state = u[..n].to_vec();
-        self.parameters = self.setting.at(&u[n + 1..]);
+        self.parameters = self.setting.at(&u[self.before..]);
         let k = self.across.len();
         let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; k * n]);
         self.setting.linearise(self.batch(), &mut f, &mut fx, &mut fp);
@@ -134,8 +144,8 @@ impl Condition for OnBranchPoints<'_> {
     }
 
     fn face(&mut self, along: &[f64]) {
-        // Beyond two parameters the bifurcations are no curve.
-        let [a, b] = match along.get(self.n + 1..) {
+        // Beyond two parameters the bifurcations are no curve, or λ is given.
+        let [a, b] = match along.get(self.before..) {
             Some([a, b]) => [*a, *b],
             _ => return,
         };
@@ -182,7 +192,7 @@ impl Condition for OnBranchPoints<'_> {
 
     fn derivative(&mut self, du: &[f64], _extra: &[f64], dg: &mut [f64]) {
         let n = self.n;
-        let direction = [&du[..n], &self.setting.spread(&du[n + 1..])].concat();
+        let direction = [&du[..n], &self.setting.spread(&du[self.before..])].concat();
         for (value, v) in dg.iter_mut().zip(self.null.chunks_exact(n + 1)) {
             let mut change = vec![0.0; n];
             self.setting.field.directional(self.batch(), &[&self.spread(v), &direction], &mut change);

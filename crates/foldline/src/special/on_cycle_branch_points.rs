@@ -45,6 +45,8 @@ pub struct OnCycleBranchPoints<'a> {
     times: Vec<f64>,
     /// Direction of λ in the free parameters, which follow the amplitude of the unfolding.
     across: Vec<f64>,
+    /// True if λ is the parameter of the branches, in whatever direction the curve goes.
+    fixed: bool,
     /// Bordered system. Scalars: T₁ if the cycle is free, ℓ, the coefficient of d. Rows: the integral, then both rows
     /// of C.
     system: System,
@@ -101,6 +103,7 @@ impl<'a> OnCycleBranchPoints<'a> {
             forcing_periods: cycle.forcing_periods,
             times: Vec::new(),
             across,
+            fixed: false,
             phase: Vec::new(),
             left: Vec::new(),
             left_phase: 0.3,
@@ -128,6 +131,12 @@ impl<'a> OnCycleBranchPoints<'a> {
             .map(|row| -> Vec<f64> { row.iter().enumerate().map(|(k, x)| x / own.setting.scales[k % n]).collect() });
         own.right = [[&rows[0][..], &[0.3, 0.7]].concat(), [&rows[1][..], &[0.6, -0.4]].concat()];
         own
+    }
+
+    /// Creates the condition for singular points of branches over the second of three free parameters, without an
+    /// unfolding: they form a curve.
+    pub fn in_three_parameters(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
+        OnCycleBranchPoints { fixed: true, ..OnCycleBranchPoints::new(setting, cycle) }
     }
 
     /// 1 if the system contains T₁ and the integral, otherwise 0.
@@ -396,7 +405,7 @@ impl Condition for OnCycleBranchPoints<'_> {
 
     fn face(&mut self, along: &[f64]) {
         // Beyond two parameters the bifurcations are no curve.
-        if self.across.len() != 2 {
+        if self.fixed || self.across.len() != 2 {
             return;
         }
         let [a, b] = [along[along.len() - 2], along[along.len() - 1]];

@@ -55,6 +55,7 @@ fn computed(model: &Model) -> Diagram {
         explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
+        designs: Vec::new(),
         record: Vec::new(),
     };
     run(&System::of(model, &[-0.5, 2.0]), &plan, 1, Diagram::default(), &Unobserved)
