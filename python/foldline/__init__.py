@@ -16,8 +16,8 @@ from ._basins import Basins, basins
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._case import Case
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
-from ._diagram import Diagram, Homotopy
 from ._designs import Design
+from ._diagram import Diagram, Homotopy
 from ._ensemble import Ensemble, ensemble
 from ._errors import ArgumentError, DeviceError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._map_plot import draw

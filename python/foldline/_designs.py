@@ -35,6 +35,21 @@ class Design:
         False if there is no answer, or only a bound on one; ``reasons`` then say why.
     reasons, checks : list of str
         Reasons, and what was found on both sides of the answer.
+
+    Examples
+    --------
+    Equilibria exist for x² = 1 - p - (l - 2)², at some l up to p = 1.
+
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "1 - p - (l - 2)^2 - x^2"}, parameters={"l": 2.0, "p": 0.1})
+    >>> study = {
+    ...     "seed": [{"name": "s", "state": {"x": 1}}],
+    ...     "branch": [{"name": "b", "from": "s", "free": "l", "range": [0, 5]}],
+    ...     "design": [{"name": "limit", "of": "b", "least": {"p": [0, 3]}, "without": "motion"}],
+    ... }
+    >>> limit = foldline.run(study, model).designs["limit"]
+    >>> limit.answered, round(limit.value, 6), limit.binds
+    (True, 1.0, 'inside')
     """
 
     name: str

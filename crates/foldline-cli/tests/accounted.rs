@@ -256,24 +256,3 @@ fn a_change_that_is_not_explained_is_found() {
     change("UPDATE points SET unstable = 0");
     assert!(!unexplained(&run).1.is_empty(), "the spectrum says otherwise");
 }
-
-/// A canard of a bursting cell on which the multipliers lose all digits: the run says so instead of reporting changes of
-/// stability that are rounding.
-#[test]
-fn multipliers_without_certain_digits_are_said() {
-    let model = include_str!("../../foldline-campaign/outside/beta-cell-bursting/model.toml");
-    let study = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nparameters = { kca = 0.013 }\n[[branch]]\nname = \"b\"\n\
-                 from = \"s\"\nfree = \"kca\"\nrange = [0.013, 0.016]\nmax-points = 27\nswitch = { hopf = 1 }\n";
-    let (_folder, run, code) = written(model, study);
-    checked(&run, code, 25);
-    let file = Connection::open(run.join("run.sqlite")).unwrap();
-    let what: Vec<String> = file
-        .prepare("SELECT what FROM shortfalls WHERE about = 'b/hopf-1'")
-        .unwrap()
-        .query_map([], |row| row.get(0))
-        .unwrap()
-        .map(Result::unwrap)
-        .collect();
-    assert!(what.iter().any(|line| line.starts_with("the multipliers are not known near 0.014640")), "{what:?}");
-    assert!(!what.iter().any(|line| line.contains("no special point was found")), "{what:?}");
-}

@@ -144,6 +144,8 @@ fn the_damping_that_bounds_a_resonance_is_exact() {
     let study = [
         start.to_string(),
         question("peak", "least = { zeta = [0.02, 2] }\nbelow = { x_max = 2 }"),
+        // The search may begin at the very value of the branch.
+        question("own", "least = { zeta = [0.05, 2] }\nbelow = { x_max = 2 }"),
         question("above", "range = [1.2, 2]\nleast = { zeta = [0.02, 2] }\nbelow = { x_max = 2 }"),
     ]
     .concat();
@@ -153,6 +155,8 @@ fn the_damping_that_bounds_a_resonance_is_exact() {
     let peak = answered(&found, "peak");
     exact(peak, zeta);
     assert!((peak.at - (1.0 - 2.0 * zeta * zeta).sqrt()).abs() < 1e-3);
+    exact(answered(&found, "own"), zeta);
+    assert!(found.branch("own/bound-1").is_some() && found.branch("own/bound-2").is_none(), "it is one curve");
     // At Ω = 1.2: (1 - Ω²)² + 4ζ²Ω² = 1/4.
     let above = answered(&found, "above");
     exact(above, (0.25 - 0.44f64.powi(2)).sqrt() / 2.4);

@@ -54,14 +54,12 @@ pub struct Follow<'w> {
     pub homecoming: Homecoming,
     /// Length of the step under inspection. What is significant along it is significant on its parts.
     pub inspected: f64,
-    /// Number of unstable eigenvalues or multipliers at the last accepted point; `None` before the first.
-    pub known: Option<usize>,
 }
 
 impl Follow<'_> {
     /// Continuation of another problem with these settings, from a new start.
     pub fn on<'p>(&'p self, problem: &'p mut dyn ZeroProblem) -> Follow<'p> {
-        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, known: None, ..*self }
+        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, ..*self }
     }
 }
 
@@ -122,7 +120,6 @@ pub fn follow(
     let mut allowance = Allowance::new();
     let mut before: Option<Station> = None;
     loop {
-        walk.known = Some(left.point.unstable);
         if let Some(end) = walk.at_bound(&left, 1e-12) {
             return end;
         }
@@ -318,12 +315,9 @@ impl Follow<'_> {
     }
 
     /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,
-    /// because rounding decides on which side of 1 it is computed. Where no digit of the multipliers is certain, the
-    /// number is that of the last accepted point.
+    /// because rounding decides on which side of 1 it is computed.
     pub(super) fn count(&self, station: &mut Station) {
-        if self.settings.stability && station.point.is_doubtful() {
-            station.point.unstable = self.known.unwrap_or(station.point.unstable);
-        } else if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
+        if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
             station.point.unstable = station.point.unstable_besides_neutral();
         }
     }

@@ -128,8 +128,6 @@ impl Follow<'_> {
         let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
-        // Multipliers whose number is not their own show no event.
-        let unresolved = self.settings.stability && [left, right].iter().any(|end| end.point.is_unresolved());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -139,11 +137,6 @@ impl Follow<'_> {
             let pitchfork = kind == Kind::BranchPoint
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             let without = match kind {
-                Kind::Fold | Kind::BranchPoint | Kind::PeriodDoubling | Kind::Torus
-                    if unresolved && (kind != Kind::Fold || fold_test != FoldTest::Slope) =>
-                {
-                    true
-                }
                 Kind::Fold => standing,
                 Kind::BranchPoint => fold_test != FoldTest::Slope && !conservative,
                 // Reciprocal pairs of multipliers have product 1 everywhere.
@@ -215,7 +208,7 @@ impl Follow<'_> {
         }
         let mut cut_there = None;
         let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
-        if self.settings.stability && quiet && !unresolved && fold_test == FoldTest::Slope && depth < CLOSE {
+        if self.settings.stability && quiet && fold_test == FoldTest::Slope && depth < CLOSE {
             match self.exchanged(&stretch, &right.point, history, cost) {
                 Some(Exchange::Apart(there)) => cut_there = Some(there),
                 Some(Exchange::Together(kind, found)) => {

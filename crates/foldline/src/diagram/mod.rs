@@ -217,25 +217,6 @@ impl Point {
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
-    /// True if the stated error of the multipliers leaves open on which side of the unit circle one of them lies, because
-    /// no digit of it is certain: near orbits of infinite period and along canards, multipliers are so far apart that
-    /// rounding may decide.
-    pub(crate) fn is_doubtful(&self) -> bool {
-        /// Error, relative to the larger of 1 and the modulus, at which no digit is left.
-        const NONE: f64 = 1.0;
-        let error = self.trust.spectrum;
-        let of_cycle = matches!(self.solution, Solution::Cycle(_));
-        let may_pass = |z: &Complex64| (z.norm() - 1.0).abs() <= error * z.norm().max(1.0);
-        of_cycle && error >= NONE && self.free_spectrum().iter().any(may_pass)
-    }
-
-    /// True if the number of unstable multipliers is that of a neighbour, because the multipliers are doubtful and their
-    /// own number is another.
-    pub(crate) fn is_unresolved(&self) -> bool {
-        let own = self.free_spectrum().iter().filter(|z| z.norm() > 1.0).count();
-        self.is_doubtful() && own != self.unstable
-    }
-
     /// Distance from 1 within which a multiplier may be exactly 1.
     fn neutral_error(&self) -> f64 {
         /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less

@@ -29,19 +29,6 @@ impl Growth<'_> {
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
 
-    /// Reports that the multipliers are not known at `point`. Returns false if the observer wants to stop.
-    pub(super) fn unresolved(&self, branch: &Branch, point: &Point) -> bool {
-        let at = value(branch, point);
-        let said = format!(
-            "the multipliers are not known near {at}: another number of them is unstable there than at the last point, \
-             and with their error of {:.1e} this means nothing; that of the last point is stated\nlikely cause: a \
-             canard or an orbit of infinite period, along which solutions first separate and then converge by more \
-             than double precision holds\nwhat to do: ignore the stability there, or end the range before it",
-            point.trust.spectrum
-        );
-        self.tell(Event::Short(&branch.name, &said))
-    }
-
     /// Reports a change in the number of unstable eigenvalues or multipliers that no special point explains. Returns
     /// false if the observer wants to stop.
     pub(super) fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {

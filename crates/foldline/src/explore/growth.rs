@@ -647,7 +647,6 @@ impl Growth<'_> {
             first_period: branch.points.iter().min_by_key(|p| p.position.abs()).and_then(|p| p.solution.free_period()),
             homecoming: Homecoming::default(),
             inspected: 0.0,
-            known: None,
         };
         // A resumed run may already be on its way back to the start.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
@@ -657,7 +656,6 @@ impl Growth<'_> {
         let recorded = self.settings.stability && branch.held.is_none() && branch.family != Family::Arc;
         let latest = RefCell::new(last);
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
-        let unresolved = Cell::new(false);
         // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
         let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
         let mut sink = |item: Item| {
@@ -705,10 +703,6 @@ impl Growth<'_> {
                         point.unstable = after;
                     }
                     latest.replace(point.clone());
-                    let doubted = recorded && point.is_unresolved() && !unresolved.replace(true);
-                    if doubted && !self.unresolved(branch, &point) {
-                        return Verdict::Stop;
-                    }
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)

@@ -48,7 +48,8 @@ impl Search<'_> {
         self.curves.iter().filter(|(_, kind)| *kind == seed.special.kind).any(|(index, _)| {
             let curve = &self.legs[*index];
             let start = curve.points.iter().filter(|point| point.position == 0);
-            curve.special.iter().map(|special| &special.point).chain(start).any(near)
+            let ends = [curve.points.first(), curve.points.last()].into_iter().flatten();
+            curve.special.iter().map(|special| &special.point).chain(start).chain(ends).any(near)
         })
     }
 
@@ -187,10 +188,12 @@ impl Search<'_> {
             let Ok(station) = holds::first(self.system, &plan, &holds, self.plan.degree, &settings, &start) else {
                 continue;
             };
-            let point = station.point;
+            let mut point = station.point;
             if !self.in_range(&point) {
                 continue;
             }
+            // It was fixed up to rounding, by which it may lie outside of a range that begins there.
+            point.parameters[self.design.vary] = self.at(&start)[1];
             let special = SpecialPoint {
                 kind: Kind::Mark,
                 unstable_before: point.unstable,
