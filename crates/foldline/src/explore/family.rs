@@ -308,7 +308,9 @@ impl Work<'_> {
             let station = holds::first(self.system, plan, &holds, self.plan.degree, &settings, &point)?;
             let outside = |index: usize, [low, high]: [f64; 2]| {
                 let value = station.point.parameters.get(index).copied().unwrap_or(low);
-                (value < low || value > high).then(|| {
+                // A start at the end of a range is known as accurately as it is solved for.
+                let slack = settings.newton_tolerance() * (self.system.unit(index) + value.abs());
+                (value < low - slack || value > high + slack).then(|| {
                     format!("the start {} lies outside the range [{}, {}]", Shown(value), Shown(low), Shown(high))
                 })
             };
