@@ -274,7 +274,7 @@ fn mistakes_about_names_and_starts_of_branches() {
             "name = \"folds\"",
             "\"folds\"",
             "\"folds\" is used twice",
-            "curve, homotopy, exploration, survey and sweep",
+            "curve, homotopy, exploration, survey, sweep and design question",
         ),
         (
             "name = \"doublings\"",
