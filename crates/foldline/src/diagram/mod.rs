@@ -238,10 +238,12 @@ impl Point {
     /// is meaningless.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
         /// Error of the multipliers above which their distance from the unit circle means nothing, as near an infinite
-        /// period.
-        const UNKNOWN: f64 = 1e-3;
+        /// period; and the same where reciprocal pairs show that the system is conservative, which needs an error well
+        /// below 1.
+        const UNKNOWN: [f64; 2] = [1e-3, 0.1];
         let error = self.neutral_error();
-        let circle = if error < UNKNOWN && self.is_one_of_family() { error } else { 0.0 };
+        let known = error < UNKNOWN[0] || error < UNKNOWN[1] && self.is_conservative();
+        let circle = if known && self.is_one_of_family() { error } else { 0.0 };
         let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0 + circle));
         self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + circle).count() - own
     }

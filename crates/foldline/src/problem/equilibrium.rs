@@ -9,7 +9,7 @@ use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Trust};
 use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::{averages, extremes};
-use crate::stability::eigenvalues;
+use crate::stability::{eigenvalues, neutral};
 use num_complex::Complex64;
 
 /// Equilibria in one free parameter (a curve) or several.
@@ -176,7 +176,6 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let n = self.n();
         self.linearise(u);
         let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
-        let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
         // f still changes with the parameters if f_x nearly vanishes.
         let free = self.setting.freedom();
         let by_free =
@@ -184,6 +183,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let unfolded = self.unfolding.as_ref().map_or(f64::MIN_POSITIVE, |own| own.rate);
         let rate = max_abs(&self.fx).max(1e-6 * by_free).max(unfolded).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
+        let unstable = neutral::unstable(&spectrum, neutral::rounding(n, residual));
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
         let averages = averages::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
         Examination { spectrum, trivial: 0, unstable, ranges, averages, trust: Trust { residual, ..Trust::default() } }

@@ -12,7 +12,7 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Kind, Mesh, Point, Solution};
 use crate::linalg::{lu, max_abs};
 use crate::problem::gauss::Scheme;
-use crate::stability::eigenvalues;
+use crate::stability::{eigenvalues, neutral};
 use num_complex::Complex64;
 
 /// Sum of two eigenvalues.
@@ -23,12 +23,22 @@ impl Monitor for Hopf {
         Kind::Hopf
     }
 
-    fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        super::product(|| pairs(&at.spectrum).map(balance))
+    fn value(&self, reference: &Point, at: &Point) -> f64 {
+        // Pairs that are neutral all along have sums of arbitrary sign.
+        let mut neutral = neutral::pairs_of(at);
+        if !neutral.is_empty() {
+            let z = &at.spectrum;
+            neutral.sort_by(|a, b| balance((z[a[0]], z[a[1]])).norm().total_cmp(&balance((z[b[0]], z[b[1]])).norm()));
+            neutral.truncate(neutral::pairs_of(reference).len());
+        }
+        let z = &at.spectrum;
+        let counts = |[i, j]: &[usize; 2]| !neutral.contains(&[*i, *j]) && !neutral.contains(&[*j, *i]);
+        super::product(|| indices(z.len()).filter(counts).map(|[i, j]| balance((z[i], z[j]))))
     }
 
     fn factor(&self, near: &Point, at: &Point) -> Option<f64> {
-        let real = |spectrum| pairs(spectrum).filter(|pair| balance(*pair).im == 0.0);
+        // Sums of other pairs may be real as well, to rounding, if symmetry makes frequencies equal.
+        let real = |spectrum| pairs(spectrum).filter(|(a, b)| *a == b.conj() || a.im == 0.0 && b.im == 0.0);
         let (first, second) = real(&near.spectrum).min_by(|a, b| balance(*a).norm().total_cmp(&balance(*b).norm()))?;
         let apart = |(a, b): &(Complex64, Complex64)| {
             ((a - first).norm() + (b - second).norm()).min((a - second).norm() + (b - first).norm())
@@ -45,7 +55,12 @@ impl Monitor for Hopf {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        Some(at.spectrum.iter().filter(|z| z.im > 0.0 && z.re > 0.0).count())
+        let neutral = neutral::pairs_of(at);
+        let unstable = |k: &usize| {
+            let z = at.spectrum[*k];
+            z.im > 0.0 && z.re > 0.0 && !neutral.iter().any(|pair| pair.contains(k))
+        };
+        Some((0..at.spectrum.len()).filter(unstable).count())
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {
@@ -53,9 +68,14 @@ impl Monitor for Hopf {
     }
 }
 
+/// Indices of all pairs of eigenvalues.
+fn indices(n: usize) -> impl Iterator<Item = [usize; 2]> {
+    (0..n).flat_map(move |i| (i + 1..n).map(move |j| [i, j]))
+}
+
 /// All pairs of eigenvalues.
 fn pairs(z: &[Complex64]) -> impl Iterator<Item = (Complex64, Complex64)> + '_ {
-    (0..z.len()).flat_map(move |i| (i + 1..z.len()).map(move |j| (z[i], z[j])))
+    indices(z.len()).map(|[i, j]| (z[i], z[j]))
 }
 
 /// Sum of two eigenvalues divided by the sum of their moduli.

@@ -2,6 +2,7 @@
 
 mod explicit;
 pub mod floquet;
+pub mod neutral;
 mod reduction;
 
 use crate::linalg::periodic_schur;

@@ -311,9 +311,12 @@ impl Part<'_> {
             }
         }
         out.checks.push(self.check(point, Quantity::Spectrum, Some(ROUNDING), worst));
-        let unstable = point.spectrum.iter().filter(|z| z.re > 0.0).count();
+        // (Real parts that are rounding may count or not.)
+        let above = |limit: f64| point.spectrum.iter().filter(|z| z.re > limit).count();
+        let largest = point.spectrum.iter().map(|z| z.norm()).fold(0.0, f64::max);
+        let possible = above(ROUNDING * largest)..=above(-ROUNDING * largest);
         let least = point.spectrum.iter().map(|z| z.re.abs()).fold(f64::INFINITY, f64::min);
-        let side = if unstable == point.unstable { 0.0 } else { least };
+        let side = if possible.contains(&point.unstable) { 0.0 } else { least };
         out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
     }
 }
