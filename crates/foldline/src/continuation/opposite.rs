@@ -20,6 +20,7 @@ use super::follow::Follow;
 use super::inspect::History;
 use super::locate::{Located, Stretch};
 use crate::diagram::{Cost, Kind, Point};
+use crate::stability::neutral;
 use num_complex::Complex64;
 
 /// Outcome for two eigenvalues on opposite sides.
@@ -163,6 +164,25 @@ impl Around<'_> {
             return 0;
         }
         let own = here.iter().zip(before.iter().zip(&after));
-        own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count()
+        let found =
+            own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count();
+        found.saturating_sub(self.collisions(centre, found))
+    }
+
+    /// Number of pairs λ, -λ among the `found` smallest eigenvalues of equilibria that are imaginary on one side and real
+    /// on the other: where they meet they have one eigenvector.
+    fn collisions(&self, centre: f64, found: usize) -> usize {
+        if centre != 0.0 {
+            return 0;
+        }
+        let real = |point: &Point| {
+            let mut all: Vec<[usize; 2]> = neutral::pairs_of(point);
+            let size = |pair: &[usize; 2]| point.spectrum[pair[0]].norm();
+            all.sort_by(|a, b| size(a).total_cmp(&size(b)));
+            let kinds = all.iter().take(found / 2).map(|pair| point.spectrum[pair[0]].im == 0.0);
+            [all.len().min(found / 2), kinds.filter(|real| *real).count()]
+        };
+        let [[pairs, before], [others, after]] = self.ends.map(real);
+        if pairs == others { before.abs_diff(after) } else { 0 }
     }
 }
