@@ -76,6 +76,21 @@ pub(super) fn read(
         let message = format!("{name} turns at folds, which are found anyway, and the other parameters are constant");
         walk.report(value.span(), message, "quantities of the solution, such as `peaks = [\"x_max\"]`");
     }
+    if let (None, Some(free), Some((range, _))) = (&held, free, &bounds) {
+        within(walk, table, ground.model, free, *range, &marks);
+    }
+    if (ground.model.forced() || ground.model.iterated())
+        && let Some(value) = table.get("switch")
+        && (switching.at(Kind::Hopf) > 0 || switching.only.iter().any(|(kind, ..)| *kind == Kind::Hopf))
+    {
+        let what = if ground.model.iterated() { "of a map" } else { "of a forced model" };
+        let message = format!("`switch` at hopf: the solutions {what} are cycles, which have no Hopf points");
+        walk.report(
+            value.span(),
+            message,
+            "`period-doubling` or `branch-point`; the pairs of cycles pass in `torus` points",
+        );
+    }
     let (name, (start, beginning, family), free, (range, until)) = (name?, origin?, free?, bounds?);
     let mut end = beginning.clone();
     end[free] = until;
@@ -221,6 +236,20 @@ pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 
         return None;
     }
     Some([low, high])
+}
+
+/// Reports values of the free parameter to mark, or to stop at, that the branch cannot reach.
+fn within(walk: &mut Walk, table: &DeTable, model: &Model, free: usize, [low, high]: [f64; 2], marks: &[Mark]) {
+    let name = &model.parameters[free].name;
+    for mark in marks.iter().filter(|mark| !mark.peak && mark.quantity == Quantity::Parameter(free)) {
+        let key = if mark.stop { "stop" } else { "mark" };
+        if let Some(value) = table.get(key)
+            && !(low..=high).contains(&mark.value)
+        {
+            let message = format!("`{key}`: {name} = {} lies outside the range of the branch", Shown(mark.value));
+            walk.report(value.span(), message, format!("a value from {} to {}", Shown(low), Shown(high)));
+        }
+    }
 }
 
 /// Reads `mark` and `stop` of a table.

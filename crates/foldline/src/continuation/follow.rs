@@ -314,12 +314,16 @@ impl Follow<'_> {
         if self.problem.is_switched() { STIFF * self.settings.min_step } else { self.settings.min_step }
     }
 
-    /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,
-    /// because rounding decides on which side of 1 it is computed.
+    /// Excludes multipliers that are on the unit circle for structural reasons (a family, a symmetry, a conservative
+    /// system) from the number of unstable ones, because rounding decides on which side they are computed.
     pub(super) fn count(&self, station: &mut Station) {
-        if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
+        if !self.settings.stability {
+            return;
+        }
+        if self.symmetric || station.point.is_one_of_family() {
             station.point.unstable = station.point.unstable_besides_neutral();
         }
+        station.point.count_if_conservative();
     }
 
     /// Attributes to a grazing the change of stability at which a vertical branch begins or ends there: along it a

@@ -233,8 +233,17 @@ impl Follow<'_> {
             kind.has_codimension_two() || double.iter().all(|there| (found.distance - there).abs() > apart)
         });
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
-        let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
+        let mut jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
+        // All eigenvalues of a null space pass at one point.
+        if let ([(Kind::BranchPoint, _, found)], true) = (&located[..], self.settings.stability && change > 1) {
+            let (ends, at) = ([&left.point, &right.point], &found.station.point);
+            let around = Around { ends, at, length: stretch.length, error: found.error };
+            let null = around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 });
+            if change <= null && (null - change) % 2 == 0 {
+                jumps[0] = change;
+            }
+        }
         // A single located event must agree with the rest of its spectrum; otherwise there is another event on one side
         // of it.
         let counts = [left.point.unstable, right.point.unstable];
@@ -324,7 +333,11 @@ impl Follow<'_> {
                 out.push(self.marked_there(mark, count));
             }
             let target = right.point.unstable as i64;
-            let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
+            let next = match (index + 1 == total, explained) {
+                (true, true) => target,
+                (_, true) => leading_to(count, target, jumps[index], &jumps[index + 1..]),
+                (_, false) => step_towards(count, target, jumps[index]),
+            };
             let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
             let null = match kind {
                 Kind::BranchPoint if self.settings.stability => {
@@ -483,16 +496,37 @@ impl Follow<'_> {
         images.any(|r| at.difference(at, self.settings.measure(), r) < SYMMETRIC)
     }
 
-    /// Brackets the change in the number of unstable eigenvalues or multipliers on an interval by bisection, as tightly
-    /// as points can be distinguished.
+    /// Brackets the changes in the number of unstable eigenvalues or multipliers on an interval by bisection, as tightly as
+    /// points can be distinguished: the first one and, if it leads to another number than that at the right end, the last.
     fn narrowed(&mut self, stretch: &Stretch, right: &Station, cost: &mut Cost) -> [Station; 2] {
-        let (mut ends, mut places) = ([stretch.left.clone(), right.clone()], [0.0, stretch.length]);
-        let before = stretch.left.point.unstable;
-        while before != right.point.unstable && (places[1] - places[0]).abs() > CLOSEST {
-            let middle = 0.5 * (places[0] + places[1]);
+        let [before, after] = [stretch.left.point.unstable, right.point.unstable];
+        let whole = [(stretch.left.clone(), 0.0), (right.clone(), stretch.length)];
+        if before == after {
+            return whole.map(|(station, _)| station);
+        }
+        let [last, next] = self.bisected(stretch, whole, &|count| count == before, cost);
+        if next.0.point.unstable == after {
+            return [last.0, next.0];
+        }
+        let rest = [next, (right.clone(), stretch.length)];
+        let [_, settled] = self.bisected(stretch, rest, &|count| count != after, cost);
+        [last.0, settled.0]
+    }
+
+    /// Narrows an interval between two places, at the first of which the number of unstable eigenvalues or multipliers
+    /// is as asked for, and at the second of which it is not.
+    fn bisected(
+        &mut self,
+        stretch: &Stretch,
+        mut ends: [(Station, f64); 2],
+        first: &dyn Fn(usize) -> bool,
+        cost: &mut Cost,
+    ) -> [(Station, f64); 2] {
+        while (ends[1].1 - ends[0].1).abs() > CLOSEST {
+            let middle = 0.5 * (ends[0].1 + ends[1].1);
             let Ok(found) = stretch.at(self.problem, self.settings, middle, cost) else { break };
-            let side = usize::from(found.point.unstable != before);
-            (ends[side], places[side]) = (found, middle);
+            let side = usize::from(!first(found.point.unstable));
+            ends[side] = (found, middle);
         }
         ends
     }
@@ -772,6 +806,13 @@ fn explains(jumps: &[usize], from: i64, to: i64) -> bool {
     reachable.contains(&to)
 }
 
+/// Count after a jump from which the other jumps lead to the target.
+fn leading_to(count: i64, target: i64, jump: usize, others: &[usize]) -> i64 {
+    let first = step_towards(count, target, jump);
+    let second = 2 * count - first;
+    if second >= 0 && !explains(others, first, target) && explains(others, second, target) { second } else { first }
+}
+
 fn step_towards(count: i64, target: i64, jump: usize) -> i64 {
     if target > count || count < jump as i64 { count + jump as i64 } else { count - jump as i64 }
 }
@@ -786,6 +827,7 @@ mod tests {
         assert!(!explains(&[], 1, 2));
         assert!(explains(&[1], 1, 2) && explains(&[1], 1, 0) && !explains(&[1], 1, 1));
         assert!(explains(&[2], 0, 2) && !explains(&[2], 1, 2) && !explains(&[2], 1, 0));
+        assert_eq!((leading_to(2, 1, 1, &[2]), leading_to(1, 1, 1, &[1]), leading_to(0, 3, 1, &[2])), (3, 0, 1));
         assert!(explains(&[1, 2], 0, 3) && !explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
     }
     #[test]

@@ -151,7 +151,8 @@ impl Around<'_> {
         const ERRORS: f64 = 10.0;
         /// Rounding of a distance along the curve.
         const LEAST: f64 = 1e-11;
-        /// Share of the step beyond which the error of the location tells nothing.
+        /// Share of the step beyond which the error of the location tells nothing, and of the change of a multiplier beyond
+        /// which its error does.
         const MOST: f64 = 0.1;
         let sorted = |point: &Point| {
             let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();
@@ -163,9 +164,15 @@ impl Around<'_> {
         if reach > MOST * self.length.abs() {
             return 0;
         }
-        let own = here.iter().zip(before.iter().zip(&after));
-        let found =
-            own.take_while(|(here, (before, after))| **here * self.length.abs() <= reach * (*before + **after)).count();
+        // Equal multipliers are split by their errors, which the location does not include.
+        let of = |point: &Point| Some(point.trust.spectrum).filter(|error| error.is_finite()).unwrap_or(0.0);
+        let blurred = self.ends.map(of).into_iter().fold(of(self.at), f64::max);
+        let vanishes = |(here, (before, after)): &(&f64, (&f64, &f64))| {
+            let beside = *before + *after;
+            let blur = if blurred <= MOST * beside { blurred } else { 0.0 };
+            **here <= reach / self.length.abs() * beside + blur
+        };
+        let found = here.iter().zip(before.iter().zip(&after)).take_while(vanishes).count();
         found.saturating_sub(self.collisions(centre, found))
     }
 

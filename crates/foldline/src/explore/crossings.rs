@@ -26,7 +26,7 @@ use super::growth::{Beginning, problem_of};
 use super::switch::{DISTANCES, across, edge_along, joined, step_off_from, twice};
 use crate::continuation::{Settings, Station};
 use crate::contract::ZeroProblem;
-use crate::diagram::{Kind, SpecialPoint};
+use crate::diagram::{Kind, Point, SpecialPoint};
 use crate::linalg::{axpy, dot};
 use crate::special::branch_point;
 use std::f64::consts::TAU;
@@ -37,8 +37,18 @@ pub struct Crossings {
     pub beginnings: Vec<Beginning>,
     /// Number of directions tried.
     pub directions: usize,
-    /// True if more were found than can be isolated: they form a family, as by a continuous symmetry. One is kept.
-    pub continuous: bool,
+    /// What they are together.
+    pub sets: Sets,
+}
+
+/// What the branches that leave a null space are together.
+pub enum Sets {
+    /// All that were found are isolated.
+    Discrete,
+    /// More were found than cubic terms can tell apart, and they form a family, as by a continuous symmetry. One is kept.
+    Continuous,
+    /// More were found, but they form no family: terms beyond the cubic ones decide which of them exist. One is kept.
+    Undecided,
 }
 
 /// Directions tried for each possible branch.
@@ -182,11 +192,26 @@ pub fn crossings(
         beginnings.push(with_edge(problem, &u, &kernel, &line, at, found));
         lines.push(line);
         if beginnings.len() > most {
+            let (Beginning::Inside(first) | Beginning::Edge { first, .. }) = &beginnings[0];
+            let continuous = is_neutral(&first.point);
             beginnings.truncate(1);
-            return Ok(Crossings { beginnings, directions, continuous: true });
+            let sets = if continuous { Sets::Continuous } else { Sets::Undecided };
+            return Ok(Crossings { beginnings, directions, sets });
         }
     }
-    if beginnings.is_empty() { Err(why) } else { Ok(Crossings { beginnings, directions, continuous: false }) }
+    if beginnings.is_empty() { Err(why) } else { Ok(Crossings { beginnings, directions, sets: Sets::Discrete }) }
+}
+
+/// True if an eigenvalue is 0 (a multiplier 1) within its error besides those that always are: the solution is one of a
+/// family at the same parameter.
+fn is_neutral(point: &Point) -> bool {
+    /// Relative rounding error of an eigenvalue.
+    const ROUNDING: f64 = 1e-10;
+    if point.solution.period().is_some() {
+        return point.neutral_multiplier().is_some();
+    }
+    let sizes = || point.spectrum.iter().map(|z| z.norm());
+    sizes().fold(f64::INFINITY, f64::min) <= ROUNDING * sizes().fold(0.0, f64::max)
 }
 
 /// Adds the special point over two turns to the start of a doubled branch.

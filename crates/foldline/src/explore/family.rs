@@ -1,5 +1,6 @@
 //! A branch of the plan with everything that grows from it.
 
+use super::crossings::Sets;
 use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
 use super::plan::{BranchPlan, Holds, Near, Plan, Start, Switching};
@@ -445,6 +446,17 @@ impl Work<'_> {
                 return None;
             }
         }
+        let found = |kind: Kind| Kind::ALL.iter().position(|k| *k == kind).map_or(0, |slot| counts[slot]);
+        for (kind, number, depth) in &pending.switching.only {
+            if *depth > 0 && *number > found(*kind) {
+                let there = match found(*kind) {
+                    0 => "none".to_string(),
+                    count => format!("{count} only"),
+                };
+                let said = format!("no branch switching at {kind} {number}: the branch has {there} in its range");
+                self.tell(Event::Short(&parent.name, &said));
+            }
+        }
         if !left.is_empty() {
             let said = format!("no branch switching, because the budget of points is used up: {}", left.join(", "));
             self.tell(Event::Short(&parent.name, &said));
@@ -516,12 +528,18 @@ impl Work<'_> {
             }
         };
         let (count, directions) = (found.beginnings.len(), found.directions);
-        let said = match found.continuous {
-            true => format!(
+        let said = match found.sets {
+            Sets::Continuous => format!(
                 "{label}: null space of dimension {dimension}, with a bifurcating branch in every direction; one of \
                  them is followed"
             ),
-            false => format!(
+            Sets::Undecided => format!(
+                "{label}: null space of dimension {dimension}; more than {} bifurcating branches seem to leave, so \
+                 that terms beyond the cubic ones decide; one of them is followed\nwhat to do: start branches at \
+                 solutions farther from this point, found by sampling",
+                (3usize.pow(dimension as u32) - 1) / 2
+            ),
+            Sets::Discrete => format!(
                 "{label}: null space of dimension {dimension}; {count} bifurcating branches found, searched for in \
                  {directions} directions"
             ),
@@ -531,7 +549,11 @@ impl Work<'_> {
             Kind::PeriodDoubling => said.replace("null space", "multiplier -1 with a null space"),
             _ => said,
         };
-        self.tell(Event::Note(&parent.name, &said))
+        let event = match found.sets {
+            Sets::Undecided => Event::Short(&parent.name, &said),
+            _ => Event::Note(&parent.name, &said),
+        };
+        self.tell(event)
             && found.beginnings.into_iter().enumerate().all(|(index, beginning)| {
                 let own = if index == 0 { name.to_string() } else { format!("{name}-{}", index + 1) };
                 let resumed = self.resumed(at, &own, more);
@@ -563,7 +585,9 @@ impl Work<'_> {
         let known = known::branch_of(self.system, settings, free, degree, first, &self.branches, self.observer);
         // Branches are too close to a parent with a null space of several dimensions; their direction told them apart.
         let together = special.kind == Kind::PeriodDoubling && parent.together_with(special) > 1;
-        let parted = special.kind == Kind::BranchPoint && special.kernel() > 1 || together;
+        // So they are at a tolerance that does not resolve the first step; its direction was compared with the parent's.
+        let coarse = known::WITHIN * self.plan.tolerance > switch::DISTANCES[0];
+        let parted = special.kind == Kind::BranchPoint && (special.kernel() > 1 || coarse) || together;
         if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
             return self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, already known")));
         }

@@ -412,15 +412,19 @@ impl Growth<'_> {
         self.finish(branch, going)
     }
 
-    /// Excludes a multiplier that is 1 by structure from the number of unstable ones at the start of a branch.
+    /// Excludes multipliers that are on the unit circle by structure from the number of unstable ones at the start of a branch.
     fn count(&self, branch: &Branch, start: &mut Point) {
         // Near a bifurcation the slope contains the rounding of the parameter divided by a small distance.
         let next_to = !starts_inside(branch) && start.parameter_slope().abs() < STANDS / super::switch::DISTANCES[0];
         let family = start.is_one_of_family() || (next_to && start.solution.period().is_some());
         let neutral = self.system.holds.is_some() && start.neutral_multiplier().is_some();
-        if self.settings.stability && (family || neutral || self.is_symmetric(branch, start)) {
+        if !self.settings.stability {
+            return;
+        }
+        if family || neutral || self.is_symmetric(branch, start) {
             start.unstable = start.unstable_besides_neutral();
         }
+        start.count_if_conservative();
     }
 
     /// True if cycles form families because the model has a rotational symmetry that leads from one to another.

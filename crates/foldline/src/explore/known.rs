@@ -136,6 +136,9 @@ pub(super) fn lasting(point: &Point, times: f64) -> Point {
     other
 }
 
+/// Difference of two solutions, in tolerances, within which they are the same: each has an error of a few on its own mesh.
+pub(super) const WITHIN: f64 = 30.0;
+
 /// Returns the name of the branch on which `point` lies; light points are recalled from the observer.
 pub fn branch_of<'b>(
     system: &System,
@@ -174,7 +177,7 @@ pub fn branch_of<'b>(
             guess.parameters[free] = value;
             let same = |found: &Point| {
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
-                close(once.as_ref().unwrap_or(found), 30.0 * settings.tolerance)
+                close(once.as_ref().unwrap_or(found), WITHIN * settings.tolerance)
             };
             if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
                 return true;

@@ -592,7 +592,10 @@ impl VectorField for Model {
     }
 
     fn switches(&self, at: Batch, out: &mut [f64]) {
-        self.inner.switches.values.run(at, &[], &mut [out]);
+        match &self.inner.switches.given_values {
+            Some(given) if !at.signs.is_empty() => given.run(at, &[at.signs], &mut [out]),
+            _ => self.inner.switches.values.run(at, &[], &mut [out]),
+        }
     }
 
     fn evaluate_precisely(&self, states: &[[f64; 2]], parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {

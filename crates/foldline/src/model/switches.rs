@@ -32,6 +32,9 @@ pub(super) struct Switches {
     pub count: usize,
     /// Values of the switches.
     pub values: Tape,
+    /// The same with given signs, if some switches depend on the branch of others, as `mod(t, T) < c` does: their values
+    /// jump, which does not show at the place of the jump itself.
+    pub given_values: Option<Tape>,
     /// Graph and nodes of the switches.
     pub graph: Graph,
     pub switches: Vec<Id>,
@@ -76,7 +79,8 @@ impl Switches {
         }
         switches.extend_from_slice(events);
         let values = Tape::new(&graph, &[&switches]);
-        Switches { count: switches.len(), values, graph, switches, roots: roots.to_vec(), reached, own }
+        let given_values = nested(&graph, &switches, &own);
+        Switches { count: switches.len(), values, given_values, graph, switches, roots: roots.to_vec(), reached, own }
     }
 
     /// The expressions with the signs of the switches in the components of direction `direction`, and their graph.
@@ -139,6 +143,19 @@ impl Switches {
     fn with_signs(&self, graph: &mut Graph, sign: &dyn Fn(&mut Graph, u32) -> Id) -> Vec<Id> {
         with_given_signs(graph, &self.roots, &self.reached, &self.own, sign)
     }
+}
+
+/// The switches with the signs of direction 0, if any of them depends on another.
+fn nested(graph: &Graph, switches: &[Id], own: &[Option<(u32, bool)>]) -> Option<Tape> {
+    let mut graph = graph.clone();
+    let reached = graph.reachable(switches);
+    let own: Vec<_> = (0..reached.len()).map(|i| own.get(i).copied().flatten()).collect();
+    if !(0..reached.len()).any(|i| reached[i] && own[i].is_some()) {
+        return None;
+    }
+    let sign = |graph: &mut Graph, switch: u32| graph.leaf(Leaf::Direction(0, switch));
+    let given = with_given_signs(&mut graph, switches, &reached, &own, &sign);
+    Some(Tape::new(&graph, &[&given]))
 }
 
 /// Marks the nodes that change along a trajectory.

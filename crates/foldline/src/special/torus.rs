@@ -3,6 +3,7 @@
 use crate::contract::Monitor;
 use crate::diagram::{Kind, Point};
 use crate::linalg::dense::MANY;
+use crate::stability::neutral;
 use num_complex::Complex64;
 
 /// Distance of a product of two multipliers from 1 that is rounding: those of an area-preserving map have the product 1
@@ -23,10 +24,15 @@ impl Monitor for Torus {
         Kind::Torus
     }
 
-    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+    fn value(&self, reference: &Point, at: &Point) -> f64 {
         let z = at.free_spectrum();
-        let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| (i, j)));
-        let factors = pairs.map(|(i, j)| z[i] * z[j]).map(off);
+        // Products that are 1 all along have arbitrary sides.
+        let error = reference.neutral_error();
+        let neutral =
+            neutral::reciprocal(reference, error).and_then(|_| neutral::reciprocal(at, error)).unwrap_or_default();
+        let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| [i, j]));
+        let counts = |[i, j]: &[usize; 2]| !neutral.contains(&[*i, *j]) && !neutral.contains(&[*j, *i]);
+        let factors = pairs.filter(counts).map(|[i, j]| z[i] * z[j]).map(off);
         if z.len() < MANY {
             return factors.product::<Complex64>().re;
         }
@@ -56,7 +62,7 @@ impl Monitor for Torus {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        let circle = 1.0 + super::rounding(at);
+        let circle = 1.0 + super::rounding(at).max(at.conservative_margin());
         Some(at.free_spectrum().iter().filter(|z| z.im > 0.0 && z.norm() > circle).count())
     }
 

@@ -134,13 +134,33 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     fn switches(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
+        self.switches_given(states, times, &[])
+    }
+
+    /// Switches of which those that depend on the branches of others take the branches of these signs, unless the orbit
+    /// slides.
+    fn switches_given(&self, states: &[f64], times: &[f64], signs: &[f64]) -> Vec<f64> {
         let (field, lanes) = (self.setting.field, states.len() / self.n());
         let mut values = vec![0.0; field.switch_count() * lanes];
+        let signs: Vec<f64> = match signs.contains(&0.0) {
+            true => Vec::new(),
+            false => signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, lanes)).collect(),
+        };
         field.switches(
-            Batch { lanes, states, parameters: Parameters::Shared(&self.parameters), times, signs: &[] },
+            Batch { lanes, states, parameters: Parameters::Shared(&self.parameters), times, signs: &signs },
             &mut values,
         );
         values
+    }
+
+    /// Switches whose values jump across their surfaces where another one passes: they take the branches of its new sign.
+    fn companions(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> Vec<usize> {
+        let time = self.time(t);
+        let mut after = signs.to_vec();
+        after[switch] = -after[switch];
+        let [old, new] = [signs, &after].map(|signs| self.switches_given(x, time.as_slice(), signs));
+        let jumps = |k: &usize| *k != switch && signs[*k] * old[*k] > 0.0 && signs[*k] * new[*k] < 0.0;
+        (0..signs.len()).filter(jumps).collect()
     }
 
     /// The intervals of a profile in which the orbit switches.
@@ -279,7 +299,8 @@ impl<'a> PiecewiseFlow<'a> {
                 // A tangency to rounding where f is continuous; where f jumps the orbit slides.
                 Met::Back(switch) if count <= MOST && self.is_continuous(&found.end, begin, &signs, switch) => {
                     count += 1;
-                    signs[switch] = -signs[switch];
+                    let companions = self.companions(&found.end, begin, &signs, switch);
+                    companions.into_iter().chain([switch]).for_each(|k| signs[k] = -signs[k]);
                     continue;
                 }
                 Met::Back(switch) => (0.0, switch, 0.0),
@@ -291,7 +312,7 @@ impl<'a> PiecewiseFlow<'a> {
                 return Err(Obstacle::Chatters);
             }
             let value = |nodes: &[f64], ends: [f64; 2], s: f64| match side {
-                0.0 => self.switch(nodes, ends, s, switch),
+                0.0 => self.switch(nodes, ends, s, switch, &signs),
                 _ => self.push(nodes, ends, s, &signs, switch, side),
             };
             let part = self.until(&found.end, [begin, last], at, &signs, &part.nodes, &value).ok_or(Obstacle::Lost)?;
@@ -310,11 +331,15 @@ impl<'a> PiecewiseFlow<'a> {
             if found.parts.is_empty() {
                 found.at_start.push((signs.clone(), switch));
             }
+            let companions = if side == 0.0 { self.companions(&found.end, end, &signs, switch) } else { Vec::new() };
             signs[switch] = match side {
-                0.0 => self.pass(&mut found, end, &signs, switch, passes)?,
+                0.0 => self.pass(&mut found, end, &signs, (switch, &companions), passes)?,
                 // f is continuous where a slide ends.
                 _ => side,
             };
+            if signs[switch] != 0.0 {
+                companions.iter().for_each(|k| signs[*k] = -signs[*k]);
+            }
             touched = None;
             // A shorter part is left out, and the next one begins in its place.
             if passes {
@@ -342,9 +367,15 @@ impl<'a> PiecewiseFlow<'a> {
         let [_, hx, _, ht] = self.setting.linearise_switches(batch);
         let (n, mut f) = (self.n(), vec![0.0; self.n()]);
         self.setting.field.evaluate(batch, &mut f);
-        for k in (0..signs.len()).filter(|k| values[*k].abs() <= ZERO * sizes[*k]) {
+        let vanishes = |k: &usize| values[*k].abs() <= ZERO * sizes[*k];
+        for k in (0..signs.len()).filter(vanishes) {
             let speed = dot(&hx[k * n..(k + 1) * n], &f) + ht[k];
             signs[k] = if speed == 0.0 { signs[k] } else { -speed.signum() };
+        }
+        // Others take the branches of these signs.
+        let given = self.switches_given(x, time.as_slice(), &signs);
+        for k in (0..signs.len()).filter(|k| !vanishes(k)) {
+            signs[k] = if given[k] > 0.0 { 1.0 } else { -1.0 };
         }
         signs
     }
@@ -588,7 +619,13 @@ impl<'a> PiecewiseFlow<'a> {
 
     /// f on both sides of a switch that vanishes at `x`, evaluated on the surface itself, and the part of each component
     /// of their difference that is rounding of the state. A kink of a stiff spring would otherwise look like a jump.
-    fn sides(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> ([Vec<f64>; 2], Vec<f64>) {
+    fn sides(
+        &self,
+        x: &[f64],
+        t: f64,
+        signs: &[f64],
+        (switch, companions): (usize, &[usize]),
+    ) -> ([Vec<f64>; 2], Vec<f64>) {
         let (n, time, scales) = (self.n(), self.time(t), self.setting.scales);
         let parameters = Parameters::Shared(&self.parameters);
         let at = |states: &'_ [f64]| -> [Vec<f64>; 4] {
@@ -605,7 +642,7 @@ impl<'a> PiecewiseFlow<'a> {
             let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size]);
             let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &signs };
             self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-            signs[switch] = -signs[switch];
+            companions.iter().chain([&switch]).for_each(|k| signs[*k] = -signs[*k]);
             (f, fx)
         });
         let [(f, fx), (other, other_fx)] = sides;
@@ -618,7 +655,8 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     fn is_continuous(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> bool {
-        let ([before, after], rounding) = self.sides(x, t, signs, switch);
+        let companions = self.companions(x, t, signs, switch);
+        let ([before, after], rounding) = self.sides(x, t, signs, (switch, &companions));
         self.same(&before, &after, &rounding)
     }
 
@@ -632,9 +670,16 @@ impl<'a> PiecewiseFlow<'a> {
 
     /// (4) at the end of the last part, which is at time `t`; `signs` are those of that part. Returns the sign of the
     /// switch from there on, 0 if the flow slides along its surface.
-    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Result<f64, Obstacle> {
+    fn pass(
+        &self,
+        found: &mut Switched,
+        t: f64,
+        signs: &[f64],
+        (switch, companions): (usize, &[usize]),
+        ends: bool,
+    ) -> Result<f64, Obstacle> {
         let x = found.end.clone();
-        let ([before, mut after], rounding) = self.sides(&x, t, signs, switch);
+        let ([before, mut after], rounding) = self.sides(&x, t, signs, (switch, companions));
         let jumps = !self.same(&before, &after, &rounding);
         if let Some(last) = found.parts.last_mut().filter(|_| ends) {
             (last.switch, last.jumps) = (Some(switch), jumps);
@@ -676,10 +721,10 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// One switch at a place of a polynomial.
-    fn switch(&self, nodes: &[f64], [begin, end]: [f64; 2], s: f64, switch: usize) -> f64 {
+    fn switch(&self, nodes: &[f64], [begin, end]: [f64; 2], s: f64, switch: usize, signs: &[f64]) -> f64 {
         let mut x = vec![0.0; self.n()];
         self.scheme.value_into(s, nodes, &mut x);
-        self.switches(&x, self.time(begin + s * (end - begin)).as_slice())[switch]
+        self.switches_given(&x, self.time(begin + s * (end - begin)).as_slice(), signs)[switch]
     }
 
     /// The transition of an interval from parts of half the length, `[n × n]`: more accurate than its own.

@@ -74,7 +74,7 @@ impl PiecewiseFlow<'_> {
             (0..n).for_each(|c| states[c * places.len() + k] = x[c]);
         }
         let times: Vec<f64> = places.iter().filter_map(|s| self.time(begin + s * (end - begin))).collect();
-        let values = self.switches(&states, &times);
+        let values = self.switches_given(&states, &times, trial.signs);
         let mut met = Met::Nothing;
         for (k, own) in values.chunks_exact(places.len()).enumerate() {
             let (sign, passed) = (trial.signs[k], trial.passed.contains(&k));
@@ -87,7 +87,7 @@ impl PiecewiseFlow<'_> {
             }
             // At the start of the part it is zero up to rounding.
             let of = |s: f64, value: f64| sign * if passed { (value - own[0]) / s } else { value };
-            let at = |s: f64| of(s, self.switch(trial.nodes, trial.ends, s, k));
+            let at = |s: f64| of(s, self.switch(trial.nodes, trial.ends, s, k, trial.signs));
             let mut margins: Vec<f64> = places.iter().zip(own).map(|(s, value)| of(*s, *value)).collect();
             let mut knots = places.clone();
             if passed {
