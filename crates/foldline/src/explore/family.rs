@@ -585,9 +585,7 @@ impl Work<'_> {
         let known = known::branch_of(self.system, settings, free, degree, first, &self.branches, self.observer);
         // Branches are too close to a parent with a null space of several dimensions; their direction told them apart.
         let together = special.kind == Kind::PeriodDoubling && parent.together_with(special) > 1;
-        // So they are at a tolerance that does not resolve the first step; its direction was compared with the parent's.
-        let coarse = known::WITHIN * self.plan.tolerance > switch::DISTANCES[0];
-        let parted = special.kind == Kind::BranchPoint && (special.kernel() > 1 || coarse) || together;
+        let parted = special.kind == Kind::BranchPoint && special.kernel() > 1 || together;
         if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
             return self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, already known")));
         }

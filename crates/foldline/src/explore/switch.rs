@@ -5,7 +5,7 @@
 //! a small step along that direction, which the original branch does not reach to first order.
 
 use super::growth::{Beginning, problem_of, setting};
-use super::{System, tori};
+use super::{System, known, tori};
 use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, station};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
@@ -20,6 +20,16 @@ use std::f64::consts::TAU;
 /// Distances along the direction in the order of trial, in scaled variables. The shorter ones are for branches that
 /// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
 pub const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
+
+/// [`DISTANCES`], beginning with those at which the branches can be told apart at the tolerance.
+fn distances(tolerance: f64) -> Vec<f64> {
+    let least = 2.0 * known::WITHIN * tolerance;
+    let mut all = DISTANCES.to_vec();
+    if DISTANCES[0] < least {
+        all.sort_by_key(|distance| *distance < least);
+    }
+    all
+}
 
 /// Returns the start of the branch that bifurcates at `at`, and its type; `None` for kinds at which no branch of
 /// equilibria or cycles does. If several pairs of eigenvalues cross the imaginary axis at once, `pair` selects one.
@@ -387,11 +397,12 @@ pub(super) fn across(
         };
         angle(&tangent) < 1.5 * angle(&chord)
     };
-    let one = step_off_from(problem, settings, u, vector, 1.0, &DISTANCES, &leaves, improved)
+    let distances = distances(settings.tolerance);
+    let one = step_off_from(problem, settings, u, vector, 1.0, &distances, &leaves, improved)
         .map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
     let symmetric =
-        step_off_from(problem, settings, u, vector, -1.0, &DISTANCES, &|_, _| true, improved).is_ok_and(|other| {
+        step_off_from(problem, settings, u, vector, -1.0, &distances, &|_, _| true, improved).is_ok_and(|other| {
             let images = system.reflections.iter().filter(|r| r.contains(&true));
             let gap = (one.parameter() - other.parameter()).abs();
             gap < 1e-6 * (1.0 + one.parameter().abs())
