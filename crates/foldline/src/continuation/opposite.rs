@@ -183,7 +183,7 @@ impl Around<'_> {
             return 0;
         }
         let real = |point: &Point| {
-            let mut all: Vec<[usize; 2]> = neutral::pairs_of(point);
+            let mut all: Vec<[usize; 2]> = neutral::marked(&point.spectrum);
             let size = |pair: &[usize; 2]| point.spectrum[pair[0]].norm();
             all.sort_by(|a, b| size(a).total_cmp(&size(b)));
             let kinds = all.iter().take(found / 2).map(|pair| point.spectrum[pair[0]].im == 0.0);

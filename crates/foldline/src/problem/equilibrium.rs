@@ -175,7 +175,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn examine(&mut self, u: &[f64]) -> Examination {
         let n = self.n();
         self.linearise(u);
-        let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
+        let mut spectrum = eigenvalues(&self.fx, n, self.setting.scales);
         // f still changes with the parameters if f_x nearly vanishes.
         let free = self.setting.freedom();
         let by_free =
@@ -183,7 +183,11 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let unfolded = self.unfolding.as_ref().map_or(f64::MIN_POSITIVE, |own| own.rate);
         let rate = max_abs(&self.fx).max(1e-6 * by_free).max(unfolded).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
-        let unstable = neutral::unstable(&spectrum, neutral::rounding(n, residual));
+        let pairs = neutral::pairs(&spectrum, neutral::rounding(n, residual));
+        if !pairs.is_empty() && self.stay_neutral(u, pairs.len()) {
+            neutral::mark(&mut spectrum, &pairs);
+        }
+        let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
         let averages = averages::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
         Examination { spectrum, trivial: 0, unstable, ranges, averages, trust: Trust { residual, ..Trust::default() } }
@@ -292,6 +296,38 @@ const ON_SURFACE: f64 = 1e-9;
 const JUMP: f64 = 1e-6;
 
 impl EquilibriumProblem<'_> {
+    /// True if at another value of the continuation parameter as many pairs of eigenvalues are neutral.
+    fn stay_neutral(&mut self, u: &[f64], count: usize) -> bool {
+        /// Change of the parameter: far above rounding, and small enough for Newton's method.
+        const BESIDE: f64 = 1e-3;
+        /// Newton iterations: the start is off by the square of the change or, without a slope, by the change.
+        const ROUNDS: usize = 8;
+        let (n, last) = (self.n(), u.len() - 1);
+        let found = [BESIDE, -BESIDE].into_iter().any(|change| {
+            let mut there = u.to_vec();
+            there[last] += change * (1.0 + u[last].abs());
+            let mut residual = f64::INFINITY;
+            for _ in 0..ROUNDS {
+                self.linearise(&there);
+                let (mut matrix, mut step, mut pivots) = (self.fx.clone(), self.f.clone(), vec![0; n]);
+                if lu::factorise(&mut matrix, n, &mut pivots).is_err() {
+                    return false;
+                }
+                lu::solve(&matrix, n, &pivots, &mut step, 1);
+                there.iter_mut().zip(&step).for_each(|(x, dx)| *x -= dx);
+                residual = (0..n).map(|i| (step[i] / (self.scale[i] + there[i].abs())).abs()).fold(0.0, f64::max);
+                if residual < f64::EPSILON {
+                    break;
+                }
+            }
+            self.linearise(&there);
+            let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
+            neutral::pairs(&spectrum, neutral::rounding(n, residual)).len() >= count
+        });
+        self.linearise(u);
+        found
+    }
+
     /// Switches at `u`: values and rates along a direction, both relative to the change of the switch over the sizes of
     /// the states.
     fn switches(&self, u: &[f64], along: &[f64]) -> [Vec<f64>; 2] {

@@ -24,7 +24,6 @@
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
 use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::{axpy, lu};
-use crate::stability::neutral;
 use num_complex::Complex64;
 
 /// An eigenvalue next to the critical one coalesces with it if it is closer than this many times the error of the
@@ -224,10 +223,7 @@ impl<'a> Held<'a> {
             }
         }
         others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
-        found.unstable = match is_cycle {
-            true => others.iter().filter(|z| z.norm() > 1.0).count(),
-            false => neutral::unstable(&others, neutral::rounding(others.len(), found.trust.residual)),
-        };
+        found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();
         // Critical eigenvalues come first, at their exact values; a computed double eigenvalue has half the digits
         // only.
         found.spectrum.extend(held.into_iter().chain(others));

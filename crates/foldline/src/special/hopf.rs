@@ -25,11 +25,11 @@ impl Monitor for Hopf {
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         // Pairs that are neutral all along have sums of arbitrary sign.
-        let mut neutral = neutral::pairs_of(at);
+        let mut neutral = neutral::marked(&at.spectrum);
         if !neutral.is_empty() {
             let z = &at.spectrum;
             neutral.sort_by(|a, b| balance((z[a[0]], z[a[1]])).norm().total_cmp(&balance((z[b[0]], z[b[1]])).norm()));
-            neutral.truncate(neutral::pairs_of(reference).len());
+            neutral.truncate(neutral::marked(&reference.spectrum).len());
         }
         let z = &at.spectrum;
         let counts = |[i, j]: &[usize; 2]| !neutral.contains(&[*i, *j]) && !neutral.contains(&[*j, *i]);
@@ -55,7 +55,7 @@ impl Monitor for Hopf {
     }
 
     fn passed(&self, at: &Point) -> Option<usize> {
-        let neutral = neutral::pairs_of(at);
+        let neutral = neutral::marked(&at.spectrum);
         let unstable = |k: &usize| {
             let z = at.spectrum[*k];
             z.im > 0.0 && z.re > 0.0 && !neutral.iter().any(|pair| pair.contains(k))

@@ -13,7 +13,8 @@
 //!
 //!   (3)  |μ_i μ_j - 1| ≤ ε (1 + |μ_i| + |μ_j|) for pairs of all multipliers of a forced cycle, with their error ε
 //!
-//! A pair that crosses the imaginary axis obeys (1) only within a relative distance ε of the crossing.
+//! A pair that crosses the imaginary axis obeys (1) within a relative distance ε of the crossing, and a step may end just
+//! there. Pairs are therefore called neutral only if they are so at another parameter value too.
 //!
 //! **Fails when** an eigenvalue is ill-conditioned, as near 1:1 resonance, where its error is about √ε.
 
@@ -52,22 +53,31 @@ pub fn pairs(spectrum: &[Complex64], rounding: f64) -> Vec<[usize; 2]> {
     found
 }
 
-/// The neutral pairs of an equilibrium.
-pub fn pairs_of(point: &Point) -> Vec<[usize; 2]> {
-    pairs(&point.spectrum, rounding(point.spectrum.len(), point.trust.residual))
+/// Marks pairs that are neutral at other parameter values as well: their sums become exactly 0, and real ones get the
+/// imaginary part -0. Computed eigenvalues are `r e^{iφ}`, whose real part is never exactly 0, or real with +0.
+pub fn mark(spectrum: &mut [Complex64], pairs: &[[usize; 2]]) {
+    for [i, j] in pairs {
+        let mut a = spectrum[*i];
+        match a.im == 0.0 {
+            true => a.im = -0.0,
+            false if spectrum[*j] == a.conj() => a.re = 0.0,
+            false => {}
+        }
+        (spectrum[*i], spectrum[*j]) = (a, if a.im == 0.0 { Complex64::new(-a.re, -0.0) } else { -a });
+    }
 }
 
-/// Number of eigenvalues with a positive real part that is not rounding.
-pub fn unstable(spectrum: &[Complex64], rounding: f64) -> usize {
-    let count = |positive: &dyn Fn(usize) -> bool| (0..spectrum.len()).filter(|k| positive(*k)).count();
-    if mirrored(spectrum, rounding).is_some() {
-        let least = rounding * largest(spectrum);
-        return count(&|k| spectrum[k].re > least);
+/// The marked pairs of a spectrum.
+pub fn marked(spectrum: &[Complex64]) -> Vec<[usize; 2]> {
+    let mut rest: Vec<usize> = (0..spectrum.len()).collect();
+    let mut found = Vec::new();
+    let is_real = |k: usize| spectrum[k].im == 0.0;
+    let may = |k: usize| !is_real(k) || spectrum[k].im.is_sign_negative();
+    while let Some(i) = rest.pop() {
+        let partner = rest.iter().position(|j| spectrum[*j] == -spectrum[i] && may(i) && may(*j));
+        found.extend(partner.map(|place| [rest.remove(place), i]));
     }
-    // (Of two real eigenvalues with the sum 0 one is positive.)
-    let on_axis: Vec<usize> =
-        pairs(spectrum, rounding).into_iter().flatten().filter(|k| spectrum[*k].im != 0.0).collect();
-    count(&|k| spectrum[k].re > 0.0 && !on_axis.contains(&k))
+    found
 }
 
 /// All eigenvalues in pairs with the sum 0 (2), if they can be paired so.
@@ -130,15 +140,24 @@ mod tests {
     #[test]
     fn pairs_on_the_axis_to_rounding_are_neutral_and_a_slow_pair_beside_a_fast_state_is_not() {
         let small = rounding(4, 0.0);
-        let undamped = spectrum(&[(1e-16, 2.0), (1e-16, -2.0), (1e-16, 1e-6), (1e-16, -1e-6)]);
-        assert_eq!((pairs(&undamped, small).len(), unstable(&undamped, small)), (2, 0));
-        let buckled = spectrum(&[(1e-16, 2.0), (1e-16, -2.0), (1e-6, 0.0), (-1e-6 + 1e-16, 0.0)]);
-        assert_eq!((pairs(&buckled, small).len(), unstable(&buckled, small)), (2, 1));
-        let stiff = spectrum(&[(-1e12, 0.0), (1e-3, 1.0), (1e-3, -1.0), (-1.0, 0.0)]);
-        assert_eq!((pairs(&stiff, small).len(), unstable(&stiff, small)), (0, 2));
-        let damped = spectrum(&[(-3.0, 0.0), (1e-16, 1.0), (1e-16, -1.0)]);
-        assert_eq!((pairs(&damped, small).len(), unstable(&damped, small)), (1, 0));
-        let saddle = spectrum(&[(-3.0, 0.0), (1.0, 0.0), (-1.0, 0.0)]);
-        assert_eq!((pairs(&saddle, small).len(), unstable(&saddle, small)), (1, 1));
+        let unstable = |z: &[Complex64]| z.iter().filter(|z| z.re > 0.0).count();
+        let cases: [(&[(f64, f64)], usize, usize); 5] = [
+            (&[(1e-16, 2.0), (1e-16, -2.0), (1e-16, 1e-6), (1e-16, -1e-6)], 2, 0),
+            (&[(1e-16, 2.0), (1e-16, -2.0), (1e-6, 0.0), (-1e-6 + 1e-16, 0.0)], 2, 1),
+            (&[(-1e12, 0.0), (1e-3, 1.0), (1e-3, -1.0), (-1.0, 0.0)], 0, 2),
+            (&[(-3.0, 0.0), (1e-16, 1.0), (1e-16, -1.0)], 1, 0),
+            (&[(-3.0, 0.0), (1.0, 0.0), (-1.0, 0.0)], 1, 1),
+        ];
+        for (values, count, outside) in cases {
+            let mut z = spectrum(values);
+            assert!(marked(&z).is_empty());
+            let own = pairs(&z, small);
+            mark(&mut z, &own);
+            assert_eq!((own.len(), marked(&z).len(), unstable(&z)), (count, count, outside), "{values:?}");
+        }
+        let mut quadruple = spectrum(&[(1e-3, 1.0), (1e-3, -1.0), (-1e-3, 1.0), (-1e-3, -1.0)]);
+        let own = pairs(&quadruple, small);
+        mark(&mut quadruple, &own);
+        assert_eq!((marked(&quadruple).len(), unstable(&quadruple)), (2, 2));
     }
 }
