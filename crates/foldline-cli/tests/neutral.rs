@@ -157,6 +157,26 @@ fn what_is_neutral_all_along_makes_no_special_points_and_what_crosses_together_i
             within: 1e-7,
             exit: 0,
         },
+        Case {
+            name: "a step that ends exactly at a Hopf point",
+            model: "[parameters]\nmu = 0\n[states]\nx = \"y\"\ny = \"mu*(1 - x^2)*y - x\"\n".into(),
+            study: Box::leak(study("\"zero\"", "mu = 1", "mu", "[-1, 1]", "mark = { mu = [0.5] }").into_boxed_str()),
+            tolerance: usual,
+            branch: "b",
+            special: vec![("mark", 0.5, [2, 2]), ("hopf", 0.0, [0, 2])],
+            within: 1e-9,
+            exit: 0,
+        },
+        Case {
+            name: "a branch that starts exactly at a Hopf point",
+            model: "[parameters]\nmu = 0\n[states]\nx = \"y\"\ny = \"mu*(1 - x^2)*y - x\"\n".into(),
+            study: Box::leak(study("\"zero\"", "", "mu", "[-1, 1]", "").into_boxed_str()),
+            tolerance: usual,
+            branch: "b",
+            special: vec![("hopf", 0.0, [0, 2])],
+            within: 1e-9,
+            exit: 0,
+        },
     ];
     let mut wrong = Vec::new();
     for case in &cases {
