@@ -22,7 +22,6 @@ use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
 use crate::problem::Setting;
-use crate::special::sliding;
 use num_complex::Complex64;
 
 /// Distances between neighbouring solutions, in scaled unknowns, in the order in which they are tried.
@@ -46,14 +45,8 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
             special: Some(special.kind),
             why,
         };
-        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
+        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::ImpactGrazing | Kind::BoundaryEquilibrium) {
             out.undecided.push(undecided("grazings, sliding bifurcations and boundary equilibria are not recomputed"));
-            continue;
-        }
-        if let Solution::Cycle(cycle) = &special.point.solution
-            && sliding::meets_jump(setting.field, &special.point.parameters, cycle)
-        {
-            out.undecided.push(undecided(super::points::JUMPS));
             continue;
         }
         let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
@@ -184,6 +177,7 @@ impl Place<'_> {
                 });
                 Ok(each.collect())
             }
+            Solution::Cycle(_) if super::points::jumps(self.setting.field, &self.special.point) => self.jumping(nodes),
             Solution::Cycle(cycle) => {
                 let base = Orbit::of(self.setting, &self.special.point).ok_or("its profile was not stored")?;
                 let (n, tangent) = (base.dim(), &self.special.point.tangent);
@@ -197,7 +191,7 @@ impl Place<'_> {
                 along.push(if base.forced { 0.0 } else { tangent[size] / base.period });
                 along.push(tangent[size + 1]);
                 normalise(&mut along);
-                let shooting = Shooting { setting: self.setting, accuracy: self.accuracy };
+                let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored: None };
                 let moved = |s: &f64| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>());
                 let orbits: Vec<Orbit> = nodes.iter().map(moved).collect();
                 // Each solution is sought in the plane through its initial guess.
@@ -212,6 +206,30 @@ impl Place<'_> {
                 Ok(nearby.collect())
             }
         }
+    }
+
+    /// Cycles along which f or the state jumps; the direction of the branch is that of the shooting equations.
+    fn jumping(&self, nodes: &[f64; 4]) -> Result<Option<Vec<Nearby>>, &'static str> {
+        if self.special.kind == Kind::BranchPoint {
+            return Err("branch points of cycles with jumps are not located again");
+        }
+        let base = Orbit::away_from_surfaces(self.setting, &self.special.point)?;
+        let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored: None };
+        let here = shooting.solve(std::slice::from_ref(&base), &[]).pop().flatten();
+        let Some(mut along) = here.and_then(|here| here.kernel.into_iter().next()) else {
+            return Err("shooting did not converge there");
+        };
+        normalise(&mut along);
+        let orbits: Vec<Orbit> =
+            nodes.iter().map(|s| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>())).collect();
+        let rows: Vec<Vec<Row>> = vec![vec![(along.clone(), 0.0)]; nodes.len()];
+        let each = shooting.solve(&orbits, &rows).into_iter().map(|solved| {
+            let solved = solved?;
+            let spectrum = solved.flow.free_multipliers(&solved.orbit);
+            let slope = *solved.kernel.first()?.last()?;
+            Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum })
+        });
+        Ok(each.collect())
     }
 
     fn equilibria(&self, x: &[f64], nodes: &[f64; 4]) -> Option<Vec<Nearby>> {
