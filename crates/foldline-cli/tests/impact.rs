@@ -1,8 +1,9 @@
 //! Cycles with impacts, against closed forms and against multiple shooting with event location.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point, Solution};
 use foldline::explore::{self, System};
+use foldline::verify::{Quantity, Verified, verify};
 use foldline_store::study_file::parse_study;
 
 /// One impact per period with d = 1, in closed form: the flight is that of the linear oscillator.
@@ -28,9 +29,22 @@ const ROTOR: &str = "name = \"rigid ring\"\n[parameters]\nOmega = 6\ne = 0.8\nze
 
 #[track_caller]
 fn run(model: &str, study: &str) -> Diagram {
+    run_and_verify(model, study, 0, &|_| {}).0
+}
+
+/// The diagram, and what is found about it after a change if `sample` of its points are recomputed.
+#[track_caller]
+fn run_and_verify(model: &str, study: &str, sample: usize, change: &dyn Fn(&mut Diagram)) -> (Diagram, Verified) {
     let text = format!("model = \"m\"\n{study}");
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+    let system = System::of_plan(&study.model, &study.plan);
+    let mut diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    change(&mut diagram);
+    let verified = match sample {
+        0 => Verified::default(),
+        _ => verify(&system, &diagram, study.plan.tolerance, Some(sample), &|_| true),
+    };
+    (diagram, verified)
 }
 
 #[track_caller]
@@ -145,4 +159,91 @@ fn an_autonomous_oscillator_leaves_its_stop() {
     // There d is the amplitude of the cycle without impacts.
     let free = own.points.iter().find(|point| point.parameters[1] > 2.1).unwrap();
     assert!((own.special[0].point.parameters[1] - free.ranges[0][1]).abs() < 1e-7);
+}
+
+/// A cycle with impacts is recomputed by shooting through its events, and a changed number is found.
+#[test]
+fn cycles_with_impacts_are_verified() {
+    let study = format!("{SEED}range = [1.6, 2]\n");
+    let (_, right) = run_and_verify(&oscillator(1.0, 0.8), &study, 6, &|_| {});
+    assert_eq!(right.wrong().count(), 0, "{:?}", right.wrong().next());
+    assert!(right.points == 6 && right.special == 1, "{} {} {:?}", right.points, right.special, right.undecided);
+    for (change, quantity) in [
+        (&|point: &mut Point| point.spectrum[0] += 1e-6, Quantity::Spectrum),
+        (&|point: &mut Point| point.ranges[0][0] += 1e-6, Quantity::Range),
+        (
+            &|point: &mut Point| {
+                let Solution::Cycle(cycle) = &mut point.solution else { return };
+                // Neither end of a flight: the motion itself is no longer one.
+                cycle.profile[4] += 1e-5;
+            },
+            Quantity::Profile,
+        ),
+    ] as [(&dyn Fn(&mut Point), Quantity); 3]
+    {
+        let (_, found) = run_and_verify(&oscillator(1.0, 0.8), &study, 200, &|diagram| {
+            let own = diagram.branches[0].points.iter_mut().find(|p| p.position == 2);
+            own.into_iter().for_each(change);
+        });
+        assert!(found.wrong().any(|check| check.quantity == quantity), "{quantity:?}");
+    }
+}
+
+/// Cycles that stick, of multipliers 0 and those of a short slip, against shooting with Filippov's field.
+#[test]
+fn cycles_with_friction_are_verified() {
+    let model = "name = \"friction\"\n[parameters]\nw = 0.6\n[forcing]\nfrequency = \"w\"\n[states.\"x''\"]\n\
+        equation = \"1.5*cos(w*t) - 0.1*x' - x - sign(x')\"\nrange = [-2, 2]\nvelocity = { range = [-2, 2] }\n";
+    let (_, found) = run_and_verify(model, &format!("{SEED}range = [0.6, 0.9]\n"), 4, &|_| {});
+    assert_eq!(found.wrong().count(), 0, "{:?}", found.wrong().next());
+    assert_eq!(found.points, 4, "{:?}", found.undecided);
+}
+
+/// Values of the first and second parameter along a curve where it passes a value of the second.
+fn marked(diagram: &Diagram, curve: &str, first: usize) -> Vec<f64> {
+    let own = branch(diagram, curve);
+    own.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| s.point.parameters[first]).collect()
+}
+
+/// Folds, doublings, torus points and impact grazings in two parameters, against closed forms: one impact in q periods
+/// of a linear oscillator is a system of two equations, and the product of the multipliers is e² exp(-c q T).
+#[test]
+fn curves_in_two_parameters_are_those_of_the_closed_form() {
+    // From either of two starts, in both directions.
+    for e in [0.8, 0.75] {
+        let study = format!(
+            "{SEED}range = [1.5, 2]\n[[curve]]\nname = \"folds\"\nof = \"b\"\nhold = \"fold\"\nfree = \"e\"\n\
+             range = [0.6, 0.9]\nmark = {{ e = [0.6, 0.7, 0.9] }}\n"
+        );
+        let diagram = run(&oscillator(1.0, e), &study);
+        let known = [1.661_838_747_964_51, 1.703_193_808_401_04, 1.803_850_336_933_88];
+        let found = marked(&diagram, "folds", 0);
+        assert_eq!(found.len(), known.len(), "{found:?}");
+        assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
+    }
+    let doublings = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 2\n\
+        parameters = { w = 0.95 }\nsamples = 32\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\n\
+        range = [0.935, 0.96]\n[[curve]]\nname = \"doublings\"\nof = \"b\"\nhold = \"period-doubling\"\n\
+        free = \"e\"\nrange = [0.65, 0.75]\nbranch-range = [0.9, 1]\nmark = { e = [0.65, 0.75] }\n";
+    let found = marked(&run(&oscillator(0.3, 0.7), doublings), "doublings", 0);
+    let known = [0.933_612_309_251_071, 0.950_865_914_101_461];
+    assert_eq!(found.len(), known.len(), "{found:?}");
+    assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
+}
+
+/// A curve of impact grazings is the amplitude of the linear oscillator.
+#[test]
+fn impact_grazings_of_a_linear_oscillator() {
+    let study = format!(
+        "{SEED}range = [1.2, 2]\n[[curve]]\nname = \"grazings\"\nof = \"b\"\nhold = \"impact-grazing\"\n\
+         free = \"A\"\nrange = [0.5, 1.5]\nbranch-range = [1.1, 2]\n"
+    );
+    let diagram = run(&oscillator(1.0, 0.8), &study);
+    let own = branch(&diagram, "grazings");
+    assert!(own.points.len() > 4);
+    for point in &own.points {
+        let [w, a] = [point.parameters[0], point.parameters[2]];
+        let linear = (1.0 - w * w).hypot(0.1 * w);
+        assert!((a - linear).abs() < 1e-8, "{w} {a} {linear}");
+    }
 }

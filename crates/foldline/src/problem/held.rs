@@ -469,7 +469,18 @@ impl ZeroProblem for Held<'_> {
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         let mut u = self.condition.guess(point);
+        let from = self.surface.mesh();
         u.extend(self.surface.unknowns_of(point));
+        // Cycles with events bring the mesh of their flights.
+        let mesh = self.surface.mesh();
+        if from != mesh {
+            self.condition.set_mesh(&mesh);
+            self.rows = generic(self.freedom * self.surface.unknowns());
+            self.tangents.clear();
+            self.tangents_at.clear();
+            self.nulls_at.clear();
+            (self.known, self.adapted) = (None, false);
+        }
         u
     }
 }

@@ -68,7 +68,9 @@ pub fn monitors<'a>(
         _ => &[],
     };
     let monitor = |&kind: &Kind| Box::new(CodimensionTwo { field, scales, held, kind }) as Box<dyn Monitor + 'a>;
-    kinds.iter().map(monitor).collect()
+    // Normal forms of cycles with events are not defined.
+    let formed = |kind: &&Kind| !matches!(kind, GeneralisedPeriodDoubling | Chenciner) || field.event_count() == 0;
+    kinds.iter().filter(formed).map(monitor).collect()
 }
 
 impl CodimensionTwo<'_> {

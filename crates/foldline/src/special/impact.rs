@@ -29,10 +29,11 @@ const SECTIONS: usize = 8;
 /// Rounds of parabolas about a maximum.
 const ROUNDS: usize = 6;
 
-/// Monitor of (1), or of (2).
+/// Monitor of (1), or of (2); `held` if one of the maxima (2) is zero all along a curve.
 struct Grazes<'a> {
     field: &'a dyn VectorField,
     touches: bool,
+    held: bool,
 }
 
 /// Monitor of equilibria on the surface of an event.
@@ -47,9 +48,17 @@ pub fn monitors<'a>(field: &'a dyn VectorField, cycles: bool) -> Vec<Box<dyn Mon
         return Vec::new();
     }
     match cycles {
-        true => [false, true].map(|touches| Box::new(Grazes { field, touches }) as Box<dyn Monitor>).into(),
+        true => on_curves(field, false),
         false => (0..field.event_count()).map(|event| Box::new(Rests { field, event }) as Box<dyn Monitor>).collect(),
     }
+}
+
+/// Monitors for cycles along a curve in two parameters, on which one of the maxima (2) is zero if `held`.
+pub fn on_curves<'a>(field: &'a dyn VectorField, held: bool) -> Vec<Box<dyn Monitor + 'a>> {
+    if field.event_count() == 0 {
+        return Vec::new();
+    }
+    [false, true].map(|touches| Box::new(Grazes { field, touches, held }) as Box<dyn Monitor>).into()
 }
 
 /// The events of a cycle.
@@ -160,6 +169,11 @@ pub(crate) struct Highest {
 
 /// The largest of the maxima (2).
 pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Highest {
+    highest_but(field, parameters, cycle, false)
+}
+
+/// The largest of the maxima (2) or, if `held`, of all but the one closest to zero.
+fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held: bool) -> Highest {
     let all = impacts(field, parameters, cycle);
     let (n, count, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     let block = (cycle.degree + 1) * n;
@@ -180,7 +194,7 @@ pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
             (0..all.len()).map(|k| [end(k), end(k + 1)]).collect()
         }
     };
-    let (mut most, mut size, mut where_) = (f64::NEG_INFINITY, 0.0f64, (0.0, 0));
+    let (mut found, mut size): (Vec<(f64, f64, usize)>, f64) = (Vec::new(), 0.0);
     for [first, last] in flights {
         let places: Vec<f64> = (first * SECTIONS..last * SECTIONS)
             .map(|k| k as f64 / SECTIONS as f64)
@@ -200,14 +214,17 @@ pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
                     let course = |place: f64| sign * at(place)[event];
                     let around = [places[k - 1], places[k], places[k + 1]];
                     let (place, value) = refined(around, own[k], &course);
-                    if value > most {
-                        (most, where_) = (value, (place, event));
-                    }
+                    found.push((value, place, event));
                 }
             }
         }
     }
-    let (place, event) = where_;
+    if held && let Some(own) = (0..found.len()).min_by(|a, b| found[*a].0.abs().total_cmp(&found[*b].0.abs())) {
+        found.remove(own);
+    }
+    // Of equal ones the first counts.
+    let higher = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
+    let (most, place, event) = found.into_iter().fold((f64::NEG_INFINITY, 0.0, 0), higher);
     let j = (place.floor() as usize) % count;
     let time = cycle.mesh[j] + (place - place.floor()) * (cycle.mesh[j + 1] - cycle.mesh[j]);
     Highest { value: if most.is_finite() { most } else { -size }, size, time, event }
@@ -257,7 +274,7 @@ impl Monitor for Grazes<'_> {
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let Solution::Cycle(cycle) = &at.solution else { return f64::NAN };
         if self.touches {
-            return -highest(self.field, &at.parameters, cycle).value;
+            return -highest_but(self.field, &at.parameters, cycle, self.held).value;
         }
         let least = speeds(self.field, &at.parameters, cycle).into_iter().fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 1.0 }

@@ -11,11 +11,16 @@ use super::{Quantity, Verified};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Cycle, Point, Solution};
 use crate::linalg::{larger, max_abs};
-use crate::problem::impact::stored::impacts;
+use crate::problem::impact::stored::{Impact, impacts};
+use crate::special::impact::{highest, speed};
 
 /// Places of a step at which extreme values are looked for, and rounds of parabolas about one.
 const SAMPLES: usize = 8;
 const ROUNDS: usize = 4;
+/// Speed of an event, relative to that of an oscillation of the same size, and distance of a maximum from a surface,
+/// relative to the largest, up to which the orbit only touches it.
+const SLOW: f64 = 1e-5;
+const TOUCHING: f64 = 1e-9;
 /// Normalised time within which a stored node lies at an event.
 const AT: f64 = 1e-13;
 
@@ -32,9 +37,15 @@ fn checked(part: &Part, point: &Point, accuracies: [f64; 2], out: &mut Verified)
     let Solution::Cycle(cycle) = &point.solution else { return Err("it is not a cycle") };
     let [shooting, coarse] =
         accuracies.map(|accuracy| Shooting { setting: part.setting, accuracy, ignored: None });
+    if grazes(part, point, cycle) {
+        return Err("an event has no speed there, and it is not certain to occur");
+    }
     let orbit = Orbit::away_from_surfaces(part.setting, point)?;
     let solve = |shooting: &Shooting, orbit: &Orbit| -> Option<Solved> {
-        shooting.solve(std::slice::from_ref(orbit), &[]).pop().flatten()
+        let mut found = shooting.solve(std::slice::from_ref(orbit), &[]).pop().flatten()?;
+        // The flow that Newton's method leaves is that of its last iterate but one.
+        found.flow = shooting.through_jumps(&found.orbit, None)?;
+        Some(found)
     };
     let rough = solve(&coarse, &orbit).ok_or("shooting did not converge")?;
     let solved = solve(&shooting, &rough.orbit).ok_or("shooting did not converge")?;
@@ -42,8 +53,7 @@ fn checked(part: &Part, point: &Point, accuracies: [f64; 2], out: &mut Verified)
     if max_abs(&off) > ELSEWHERE[usize::from(part.in_several_parameters())] {
         return Err("shooting converged to another solution");
     }
-    // The flow of the solution itself; that of `solved` belongs to the last iterate but one.
-    let flow = shooting.through_jumps(&solved.orbit, None).ok_or("the integrator did not return")?;
+    let flow = &solved.flow;
     out.points += 1;
     let noise = ROUNDING + max_abs(&shooting.between(&rough.orbit, &solved.orbit));
     let stated = point.trust.discretisation + point.trust.residual + noise;
@@ -69,6 +79,20 @@ fn checked(part: &Part, point: &Point, accuracies: [f64; 2], out: &mut Verified)
     out.checks.push(part.check(point, Quantity::Range, Some(own), apart));
     part.multipliers(point, &solved, &rough, out);
     Ok(())
+}
+
+/// True if an event of a cycle has hardly any speed, or its surface is only just not met.
+fn grazes(part: &Part, point: &Point, cycle: &Cycle) -> bool {
+    let field = part.setting.field;
+    if field.event_count() == 0 {
+        return false;
+    }
+    let touch = highest(field, &point.parameters, cycle);
+    let unit = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    let usual = touch.size * std::f64::consts::TAU / unit;
+    let speed = |own: &Impact| speed(field, &point.parameters, cycle, own).abs();
+    touch.value.abs() < TOUCHING * touch.size
+        || impacts(field, &point.parameters, cycle).iter().any(|own| speed(own) < SLOW * usual)
 }
 
 /// A recomputed cycle beside the stored one.
@@ -184,7 +208,7 @@ impl Found<'_> {
 }
 
 /// Height of a maximum near three places within a step, at least `value`.
-fn refined(mut t: [f64; 3], value: f64, at: &dyn Fn(f64) -> f64) -> f64 {
+pub(super) fn refined(mut t: [f64; 3], value: f64, at: &dyn Fn(f64) -> f64) -> f64 {
     let mut best = value;
     for _ in 0..ROUNDS {
         let v = t.map(at);

@@ -243,14 +243,18 @@ impl<'a> Located<'a> {
     fn astray(&self, x: &[f64], time: f64, signs: &[f64]) -> bool {
         let (n, kinks) = (x.len(), self.kinks());
         let own_time = [time];
+        let side = |s: usize| match s.checked_sub(kinks) {
+            Some(event) => -self.field().event_direction(event),
+            None => signs[s],
+        };
+        let values = self.switches(x, time);
+        if (0..values.len()).all(|s| side(s) * values[s] >= 0.0) {
+            return false;
+        }
         let [h, gradient, _, later] = self.setting.linearise_switches(self.batch(x, &own_time, &[]));
         (0..h.len()).any(|s| {
-            let side = match s.checked_sub(kinks) {
-                Some(event) => -self.field().event_direction(event),
-                None => signs[s],
-            };
             let size = (0..n).map(|j| (gradient[s * n + j] * x[j]).abs()).sum::<f64>() + later[s].abs();
-            side * h[s] < -ROUNDING * size && !self.ignores(Met::Surface(s), time)
+            side(s) * h[s] < -ROUNDING * size && !self.ignores(Met::Surface(s), time)
         })
     }
 

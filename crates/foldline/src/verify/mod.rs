@@ -12,7 +12,7 @@
 //! | cycles along which f or the state jumps | `located`, `jumping` |
 //! | single points | `points` |
 //! | cycles of maps, by the composed map | `maps` |
-//! | positions of special points | `special` |
+//! | positions of special points | `special`, `touching` |
 //! | changes of stability | `record` |
 //!
 //! **Fails when** the integration itself is not accurate enough: stiff equations, or trajectories that only touch a surface.
@@ -28,6 +28,7 @@ mod shooting;
 mod special;
 #[cfg(test)]
 mod tests;
+mod touching;
 mod variational;
 
 use crate::diagram::{Branch, Diagram, Family, Kind, Solution};

@@ -12,11 +12,13 @@
 //!   period doubling   (3)  μ + 1 of the multiplier closest to -1
 //!   torus             (4)  |μ| - 1 of the complex pair closest to the unit circle
 //!   Hopf              (5)  Re of the complex pair of eigenvalues closest to the imaginary axis
+//!   grazing           (6)  the extremum of the switch on orbits that do not meet its surface there
 //! ```
 //!
 //! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
+use super::touching::Touch;
 use super::{Check, Quantity, Undecided, Verified, accuracies, maps};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
@@ -45,8 +47,8 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
             special: Some(special.kind),
             why,
         };
-        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::ImpactGrazing | Kind::BoundaryEquilibrium) {
-            out.undecided.push(undecided("grazings, sliding bifurcations and boundary equilibria are not recomputed"));
+        if matches!(special.kind, Kind::Sliding | Kind::BoundaryEquilibrium) {
+            out.undecided.push(undecided("sliding bifurcations and boundary equilibria are not located again"));
             continue;
         }
         let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
@@ -86,6 +88,8 @@ struct Nearby {
     parameter: f64,
     slope: f64,
     spectrum: Vec<Complex64>,
+    /// Extremum of the switch at whose surface a cycle touches, 0 elsewhere.
+    touch: f64,
 }
 
 impl Place<'_> {
@@ -157,6 +161,7 @@ impl Place<'_> {
                 pairs.sort_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
                 pairs.first().map(|z| z.re)
             }
+            Kind::Grazing | Kind::ImpactGrazing => Some(nearby.touch),
             _ => None,
         }
     }
@@ -173,11 +178,16 @@ impl Place<'_> {
                 }
                 let each = nodes.iter().map(|distance| {
                     let (parameter, slope, spectrum) = maps::beside(self.setting, &self.special.point, *distance)?;
-                    Some(Nearby { parameter, slope, spectrum })
+                    Some(Nearby { parameter, slope, spectrum, touch: 0.0 })
                 });
                 Ok(each.collect())
             }
-            Solution::Cycle(_) if super::points::jumps(self.setting.field, &self.special.point) => self.jumping(nodes),
+            Solution::Cycle(_)
+                if matches!(self.special.kind, Kind::Grazing | Kind::ImpactGrazing)
+                    || super::points::jumps(self.setting.field, &self.special.point) =>
+            {
+                self.jumping(nodes)
+            }
             Solution::Cycle(cycle) => {
                 let base = Orbit::of(self.setting, &self.special.point).ok_or("its profile was not stored")?;
                 let (n, tangent) = (base.dim(), &self.special.point.tangent);
@@ -201,7 +211,7 @@ impl Place<'_> {
                     let solved = solved?;
                     let spectrum = solved.flow.free_multipliers(&solved.orbit);
                     let slope = *solved.kernel.first()?.last()?;
-                    Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum })
+                    Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum, touch: 0.0 })
                 });
                 Ok(nearby.collect())
             }
@@ -214,7 +224,14 @@ impl Place<'_> {
             return Err("branch points of cycles with jumps are not located again");
         }
         let base = Orbit::away_from_surfaces(self.setting, &self.special.point)?;
-        let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored: None };
+        let touch = match self.special.kind {
+            Kind::Grazing | Kind::ImpactGrazing => {
+                Some(Touch::of(self.setting, self.special.kind, &self.special.point).ok_or("it touches no surface")?)
+            }
+            _ => None,
+        };
+        let ignored = touch.map(|touch| touch.ignored(&base));
+        let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored };
         let here = shooting.solve(std::slice::from_ref(&base), &[]).pop().flatten();
         let Some(mut along) = here.and_then(|here| here.kernel.into_iter().next()) else {
             return Err("shooting did not converge there");
@@ -225,9 +242,15 @@ impl Place<'_> {
         let rows: Vec<Vec<Row>> = vec![vec![(along.clone(), 0.0)]; nodes.len()];
         let each = shooting.solve(&orbits, &rows).into_iter().map(|solved| {
             let solved = solved?;
-            let spectrum = solved.flow.free_multipliers(&solved.orbit);
+            // The flow that Newton's method leaves is that of its last iterate but one.
+            let flow = shooting.through_jumps(&solved.orbit, ignored)?;
+            let spectrum = flow.free_multipliers(&solved.orbit);
             let slope = *solved.kernel.first()?.last()?;
-            Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum })
+            let touch = match touch {
+                Some(touch) => touch.extremum(&shooting, &solved.orbit, &flow.legs)?,
+                None => 0.0,
+            };
+            Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum, touch })
         });
         Ok(each.collect())
     }
@@ -277,7 +300,7 @@ impl Place<'_> {
                 let mut kernel: Vec<f64> = right.iter().skip(1).step_by(2).copied().collect();
                 normalise(&mut kernel);
                 let spectrum = periodic_schur::eigenvalues(&fx, n)?.iter().map(|value| value.value()).collect();
-                return Some(Nearby { parameter: value, slope: kernel[n], spectrum });
+                return Some(Nearby { parameter: value, slope: kernel[n], spectrum, touch: 0.0 });
             }
             last = length;
             state.iter_mut().zip(scales).zip(&update).for_each(|((x, s), d)| *x += s * d);

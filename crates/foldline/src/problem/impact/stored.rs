@@ -86,6 +86,17 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
     found
 }
 
+/// The events of a cycle that move its state: not those of an impact without speed.
+pub(crate) fn hard(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<Impact> {
+    /// Change of the state, relative to the largest, that is none.
+    const NONE: f64 = 1e-5;
+    let largest = cycle.profile.iter().fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+    let change = |own: &Impact| own.after.iter().zip(&own.before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let mut all = impacts(field, parameters, cycle);
+    all.retain(|own| change(own) > NONE * largest);
+    all
+}
+
 /// The cycle with a mesh node at a time, and the interval that ends there.
 pub(crate) fn with_node(cycle: &Cycle, t: f64) -> (Cycle, usize) {
     let (n, scheme) = (cycle.dim(), cycle.scheme());
