@@ -295,9 +295,17 @@ pub(super) fn beyond<'a>(
             let guess = u.iter().zip(&row).map(|(u, t)| u + distance * t).collect();
             let plane = Plane { row, base: u.clone(), distance };
             let found = settle(&mut *problem, settings, plane, guess, side, &mut Cost::default());
-            if let Ok(found) = found
+            if let Ok(mut found) = found
                 && inadmissible(field, &found.point).is_none()
             {
+                // The branch goes on away from the grazing.
+                let there = problem.transfer(&u, &mesh, &found.mesh);
+                let off: Vec<f64> = found.u.iter().zip(&there).map(|(a, b)| a - b).collect();
+                if std::env::var("DBG").is_ok() { eprintln!("DBG {distance} {sign} dot {:e} step {:e} lam {:e} {:e}", problem.dot(&off, &found.tangent), problem.dot(&off, &off).sqrt(), found.u[found.u.len()-1], u[u.len()-1]); }
+                if problem.dot(&off, &found.tangent) < 0.0 {
+                    found.tangent.iter_mut().for_each(|t| *t = -*t);
+                    found.point.tangent.iter_mut().for_each(|t| *t = -*t);
+                }
                 return Some((problem, found));
             }
         }

@@ -22,10 +22,12 @@
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Ending, Kind, Point, Solution};
 use crate::linalg::dot;
-use crate::problem::impact::stored::{Impact, impacts, surfaces, times_of};
+use crate::problem::impact::stored::{Impact, hard, impacts, surfaces, times_of};
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours.
 const SECTIONS: usize = 8;
+/// Distance of places, in intervals, up to which they are the same.
+const SAME_PLACE: f64 = 1e-3;
 /// Rounds of parabolas about a maximum.
 const ROUNDS: usize = 6;
 
@@ -174,7 +176,7 @@ pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
 
 /// The largest of the maxima (2) or, if `held`, of all but the one closest to zero.
 fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held: bool) -> Highest {
-    let all = impacts(field, parameters, cycle);
+    let all = if held { hard(field, parameters, cycle) } else { impacts(field, parameters, cycle) };
     let (n, count, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     let block = (cycle.degree + 1) * n;
     let at = |place: f64| -> Vec<f64> {
@@ -219,8 +221,14 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
             }
         }
     }
-    if held && let Some(own) = (0..found.len()).min_by(|a, b| found[*a].0.abs().total_cmp(&found[*b].0.abs())) {
-        found.remove(own);
+    let closest = found.iter().copied().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    if let Some((_, own, event)) = closest.filter(|_| held) {
+        // Without events the period is searched a little beyond its end.
+        let apart = |place: f64| {
+            let off = (place - own).rem_euclid(count as f64);
+            off.min(count as f64 - off)
+        };
+        found.retain(|other| other.2 != event || apart(other.1) > SAME_PLACE);
     }
     // Of equal ones the first counts.
     let higher = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
@@ -276,7 +284,12 @@ impl Monitor for Grazes<'_> {
         if self.touches {
             return -highest_but(self.field, &at.parameters, cycle, self.held).value;
         }
-        let least = speeds(self.field, &at.parameters, cycle).into_iter().fold(f64::INFINITY, f64::min);
+        let all = match self.held {
+            true => hard(self.field, &at.parameters, cycle),
+            false => impacts(self.field, &at.parameters, cycle),
+        };
+        let speed = |own: &Impact| speed(self.field, &at.parameters, cycle, own);
+        let least = all.iter().map(speed).fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 1.0 }
     }
 

@@ -26,6 +26,7 @@ use crate::contract::{Condition, ZeroProblem};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
 use crate::linalg::{dot, lu, max_abs};
 use crate::problem::Setting;
+use crate::problem::impact::stored::{hard, impacts};
 use crate::problem::impact::{ImpactProblem, Returns};
 use num_complex::Complex64;
 
@@ -79,6 +80,10 @@ impl<'a> OnImpacts<'a> {
         let (place, size) = match kind {
             Kind::ImpactGrazing => {
                 let Highest { size, time, event, .. } = highest(setting.field, &setting.parameters, cycle);
+                // The special point may have the event that grazes, or not.
+                let [all, others] = [impacts, hard].map(|find| find(setting.field, &setting.parameters, cycle));
+                let grazes = all.iter().find(|own| others.iter().all(|other| other.interval != own.interval));
+                let (time, event) = grazes.map_or((time, event), |own| (own.time, own.event));
                 let sign = setting.field.event_direction(event);
                 let sign = if sign == 0.0 { problem.side(event) } else { sign };
                 let (flight, share) = problem.place(time);
