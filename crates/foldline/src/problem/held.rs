@@ -293,7 +293,8 @@ impl ZeroProblem for Held<'_> {
     }
 
     fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
-        self.surface.obstacle(&u[self.extra()..])
+        let (extra, rest) = u.split_at(self.extra());
+        self.surface.obstacle(rest).or_else(|| self.condition.obstacle(extra))
     }
 
     fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {

@@ -20,6 +20,8 @@
 //!
 //! **Departures.** Derivatives of g are central differences: second derivatives of switches, resets and of f in time are
 //! not available. They only guide Newton's method, and g itself is computed to rounding.
+//!
+//! **Fails when** a curve of torus points comes to a 1:1 or 1:2 resonance, where it ends with a message.
 
 use super::impact::{Highest, highest};
 use crate::contract::{Condition, ZeroProblem};
@@ -32,6 +34,8 @@ use num_complex::Complex64;
 
 /// Relative size of the steps of differences.
 const STEP: f64 = 2e-5;
+/// |sin θ| at a strong resonance: there (3) is singular, since the period doublings that meet the curve satisfy it too.
+const STRONG: f64 = 0.02;
 /// Half the width of the part of a flight in which a maximum is sought, samples of each half, and rounds of parabolas.
 const BESIDE: f64 = 0.05;
 const SAMPLES: i32 = 8;
@@ -257,7 +261,15 @@ impl Condition for OnImpacts<'_> {
 
     fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool {
         (self.at, self.extra) = (u.to_vec(), extra.to_vec());
-        self.value(u, extra, g, true).is_some()
+        self.obstacle(extra).is_none() && self.value(u, extra, g, true).is_some()
+    }
+
+    fn obstacle(&self, extra: &[f64]) -> Option<&'static str> {
+        let at_resonance = extra.iter().any(|angle| angle.sin().abs() < STRONG);
+        at_resonance.then_some(
+            "the curve of torus points comes to a 1:1 or 1:2 resonance, next to which those of cycles with events are not \
+             computed",
+        )
     }
 
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]) {
