@@ -298,11 +298,7 @@ pub(super) fn beyond<'a>(
             if let Ok(mut found) = found
                 && inadmissible(field, &found.point).is_none()
             {
-                // The branch goes on away from the grazing.
-                let there = problem.transfer(&u, &mesh, &found.mesh);
-                let off: Vec<f64> = found.u.iter().zip(&there).map(|(a, b)| a - b).collect();
-                if std::env::var("DBG").is_ok() { eprintln!("DBG {distance} {sign} dot {:e} step {:e} lam {:e} {:e}", problem.dot(&off, &found.tangent), problem.dot(&off, &off).sqrt(), found.u[found.u.len()-1], u[u.len()-1]); }
-                if problem.dot(&off, &found.tangent) < 0.0 {
+                if approaches(&*problem, field, &found, vanishes.is_none()) {
                     found.tangent.iter_mut().for_each(|t| *t = -*t);
                     found.point.tangent.iter_mut().for_each(|t| *t = -*t);
                 }
@@ -311,6 +307,26 @@ pub(super) fn beyond<'a>(
         }
     }
     None
+}
+
+/// True if the tangent at a point beside a grazing leads to it: with a new event, to where that loses its speed, else
+/// to where the surface is touched.
+fn approaches(problem: &dyn ZeroProblem, field: &dyn VectorField, found: &Station, gained: bool) -> bool {
+    /// Length of the step that decides, in scaled variables.
+    const STEP: f64 = 1e-5;
+    let value = |by: f64| {
+        let u: Vec<f64> = found.u.iter().zip(&found.tangent).map(|(u, t)| u + by * t).collect();
+        let at = problem.point(&u, &found.tangent, Examination::default());
+        let Solution::Cycle(cycle) = &at.solution else { return f64::NAN };
+        match gained {
+            false => -highest(field, &at.parameters, cycle).value,
+            true => {
+                let all = impacts(field, &at.parameters, cycle);
+                all.iter().map(|own| speed(field, &at.parameters, cycle, own)).fold(f64::INFINITY, f64::min)
+            }
+        }
+    };
+    value(STEP) < value(-STEP)
 }
 
 fn of_flights<'a>(
