@@ -339,7 +339,10 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
     }
     for (_, table) in walk.tables(root, "curve") {
         let Some(value) = table.get("hold") else { continue };
-        if matches!(value.as_ref().as_str(), Some("branch-point" | "boundary-equilibrium" | "homoclinic" | "heteroclinic")) {
+        if matches!(
+            value.as_ref().as_str(),
+            Some("branch-point" | "boundary-equilibrium" | "homoclinic" | "heteroclinic")
+        ) {
             let message = "curves of this kind are not followed for models with events";
             walk.report(value.span(), message, "fold, period-doubling, torus, hopf or impact-grazing");
         }

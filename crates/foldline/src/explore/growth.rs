@@ -445,7 +445,8 @@ impl Growth<'_> {
         };
         let Some(start) = branch.points.first().filter(|_| !self.system.field.iterated()) else { return true };
         if self.system.field.event_count() > 0 {
-            let note = format!("{sought} points are not searched for: normal forms of cycles with events are not computed");
+            let note =
+                format!("{sought} points are not searched for: normal forms of cycles with events are not computed");
             return self.tell(Event::Note(&branch.name, &note));
         }
         let own = setting(self.system, branch.free, &start.parameters);

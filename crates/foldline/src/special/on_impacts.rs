@@ -281,7 +281,8 @@ impl Condition for OnImpacts<'_> {
         let step = STEP / along;
         let mut ends = [vec![0.0; dg.len()], vec![0.0; dg.len()]];
         for (end, sign) in ends.iter_mut().zip([-1.0, 1.0]) {
-            let moved = |x: &[f64], d: &[f64]| -> Vec<f64> { x.iter().zip(d).map(|(x, d)| x + sign * step * d).collect() };
+            let moved =
+                |x: &[f64], d: &[f64]| -> Vec<f64> { x.iter().zip(d).map(|(x, d)| x + sign * step * d).collect() };
             if self.value(&moved(&u, du), &moved(&own, extra), end, false).is_none() {
                 return dg.fill(f64::NAN);
             }

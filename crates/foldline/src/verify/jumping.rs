@@ -5,7 +5,7 @@
 //! the trajectory at the same fraction of the flight, since both jump at slightly different times.
 
 use super::located::{Leg, within};
-use super::points::{Along, Path, Part, ELSEWHERE, ROUNDING};
+use super::points::{Along, ELSEWHERE, Part, Path, ROUNDING};
 use super::shooting::{Orbit, Shooting, Solved};
 use super::{Quantity, Verified};
 use crate::contract::{Batch, Parameters};
@@ -35,8 +35,7 @@ pub(super) fn verify(part: &Part, point: &Point, accuracies: [f64; 2], out: &mut
 
 fn checked(part: &Part, point: &Point, accuracies: [f64; 2], out: &mut Verified) -> Result<(), &'static str> {
     let Solution::Cycle(cycle) = &point.solution else { return Err("it is not a cycle") };
-    let [shooting, coarse] =
-        accuracies.map(|accuracy| Shooting { setting: part.setting, accuracy, ignored: None });
+    let [shooting, coarse] = accuracies.map(|accuracy| Shooting { setting: part.setting, accuracy, ignored: None });
     if grazes(part, point, cycle) {
         return Err("an event has no speed there, and it is not certain to occur");
     }
@@ -192,7 +191,8 @@ impl Found<'_> {
                     let around = [place(inside - 1), place(inside), place(inside + 1)];
                     let best = sign * range[end];
                     // Only the neighbourhood of the highest values is worth a closer look.
-                    let spread = (value(inside - 1) - value(inside)).abs().max((value(inside + 1) - value(inside)).abs());
+                    let spread =
+                        (value(inside - 1) - value(inside)).abs().max((value(inside + 1) - value(inside)).abs());
                     let height = match value(top) + spread > best {
                         true => refined(around, value(top), &|theta| sign * at(times, states, theta)[c]),
                         false => value(top),

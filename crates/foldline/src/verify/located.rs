@@ -313,7 +313,9 @@ impl<'a> Located<'a> {
         let arrival = integrator.trajectory(&start, span, &sections, &mut |passage| match passage {
             Passage::Crossing(crossing) => {
                 let own = all[crossing.section].0;
-                if met.is_none() && crossing.time - span[0] > AGAIN * (span[1] - span[0]) && !self.ignores(own, crossing.time)
+                if met.is_none()
+                    && crossing.time - span[0] > AGAIN * (span[1] - span[0])
+                    && !self.ignores(own, crossing.time)
                 {
                     met = Some((own, crossing.time, crossing.state.clone()));
                 }
@@ -322,7 +324,8 @@ impl<'a> Located<'a> {
             Passage::Step(step) => {
                 let ends = [step.start_time(), step.end_time()];
                 let end = met.as_ref().map_or(ends[1], |(_, time, _)| *time);
-                let share = if met.is_some() && ends[1] > ends[0] { (end - ends[0]) / (ends[1] - ends[0]) } else { 1.0 };
+                let share =
+                    if met.is_some() && ends[1] > ends[0] { (end - ends[0]) / (ends[1] - ends[0]) } else { 1.0 };
                 steps.push(([ends[0], end], sampled(step, n, share)));
                 let mut x = vec![0.0; n];
                 step.end_into(&mut x);
@@ -395,8 +398,7 @@ impl<'a> Located<'a> {
             return Some((state.to_vec(), beyond));
         }
         let speed = dot(gradient, &before) + later;
-        let jump: Vec<f64> =
-            (0..n).map(|i| dot(&r_x[i * n..(i + 1) * n], &before) + r_t[i] - f[i]).collect();
+        let jump: Vec<f64> = (0..n).map(|i| dot(&r_x[i * n..(i + 1) * n], &before) + r_t[i] - f[i]).collect();
         let mut out = after.clone();
         for (block, width, extra, shift) in [(along, n, None, None), (by_free, k, Some(&r_p), Some(by))] {
             let column = |c: usize| -> Vec<f64> { (0..n).map(|j| block[j * width + c]).collect() };

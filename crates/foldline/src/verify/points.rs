@@ -77,7 +77,8 @@ impl Part<'_> {
     }
 
     fn cycles(&self, points: &[&Point], [accuracy, coarser]: [f64; 2], out: &mut Verified) {
-        let [shooting, coarse] = [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy, ignored: None });
+        let [shooting, coarse] =
+            [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy, ignored: None });
         let (mut own, mut orbits) = (Vec::new(), Vec::new());
         for point in points {
             if self.joins(point) {
@@ -145,7 +146,13 @@ impl Part<'_> {
 
     /// Stated error and actual difference of the range, relative to its size, of the state or output for which their
     /// ratio is worst. Outputs are also allowed the effect of the error of the states.
-    pub(super) fn range_difference(&self, point: &Point, ranges: &[[f64; 2]], stated: f64, passed_on: &[f64]) -> (f64, f64) {
+    pub(super) fn range_difference(
+        &self,
+        point: &Point,
+        ranges: &[[f64; 2]],
+        stated: f64,
+        passed_on: &[f64],
+    ) -> (f64, f64) {
         let n = self.system.scales.len();
         // An angle that turns takes all values.
         let turns = |c: usize| point.solution.gain().get(c).is_some_and(|gain| *gain != 0.0);
