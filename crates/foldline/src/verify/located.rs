@@ -143,7 +143,7 @@ impl VectorField for Fixed<'_> {
     }
 }
 
-/// What a section of a trajectory means.
+/// Meaning of a section of a trajectory.
 #[derive(Clone, Copy, Debug)]
 enum Met {
     /// A switch or an event changes its sign.

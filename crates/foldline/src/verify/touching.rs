@@ -18,7 +18,7 @@ const WINDOW: f64 = 0.05;
 /// Places of a step at which the switch is evaluated.
 const SAMPLES: usize = 4;
 
-/// Where a cycle touches a surface.
+/// Place at which a cycle touches a surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     switch: usize,

@@ -37,7 +37,7 @@ use segments::{Nothing, Segments};
 use std::cell::{Cell, RefCell};
 pub(crate) use stored::Flights;
 
-/// How perturbations return after a period.
+/// Return of perturbations after a period.
 pub(crate) struct Returns {
     /// `[k][n × n]`: S_i Φ_i of (2).
     pub transitions: Vec<Vec<f64>>,

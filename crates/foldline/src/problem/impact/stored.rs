@@ -90,7 +90,7 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
 
 /// The events of a cycle that move its state: not those of an impact without speed.
 pub(crate) fn hard(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<Impact> {
-    /// Change of the state, relative to the largest, that is none.
+    /// Change of the state, relative to the largest, up to which it counts as unchanged.
     const NONE: f64 = 1e-5;
     let largest = cycle.profile.iter().fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
     let change = |own: &Impact| own.after.iter().zip(&own.before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
