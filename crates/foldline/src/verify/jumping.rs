@@ -21,6 +21,8 @@ const ROUNDS: usize = 4;
 /// relative to the largest, up to which the orbit only touches it.
 const SLOW: f64 = 1e-5;
 const TOUCHING: f64 = 1e-9;
+/// Normalised time before a touch at which its speed is evaluated.
+const BESIDE: f64 = 1e-7;
 /// Normalised time within which a stored node lies at an event.
 const AT: f64 = 1e-13;
 
@@ -90,7 +92,12 @@ fn grazes(part: &Part, point: &Point, cycle: &Cycle) -> bool {
     let unit = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
     let usual = touch.size * std::f64::consts::TAU / unit;
     let speed = |own: &Impact| speed(field, &point.parameters, cycle, own).abs();
-    touch.value.abs() < TOUCHING * touch.size
+    // A corner at the surface is no touch but an event that is not one.
+    let beside = (touch.time - BESIDE).rem_euclid(1.0);
+    let interval = cycle.mesh.partition_point(|node| *node <= beside).clamp(1, cycle.intervals()) - 1;
+    let state = cycle.state(beside);
+    let there = Impact { interval, time: beside, event: touch.event, before: state.clone(), after: state };
+    touch.value.abs() < TOUCHING * touch.size && speed(&there) < SLOW * usual
         || impacts(field, &point.parameters, cycle).iter().any(|own| speed(own) < SLOW * usual)
 }
 
