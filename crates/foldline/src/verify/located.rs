@@ -51,19 +51,25 @@ pub(super) struct Jump {
     pub(super) time: f64,
 }
 
+/// Times at the ends of a step, and the states `[5][n]` at [`PLACES`].
+pub(super) type Kept = ([f64; 2], Vec<f64>);
+
+/// A function of time and state.
+type Value<'a> = Box<dyn Fn(f64, &[f64]) -> f64 + 'a>;
+
 /// A part of a trajectory on which f is smooth.
 #[derive(Clone, Debug)]
 pub(super) struct Leg {
     /// Number of jumps of the state since the first node of the orbit.
     pub(super) flight: usize,
     /// Times at the ends of each step, and the states `[5][n]` at [`PLACES`].
-    pub(super) steps: Vec<([f64; 2], Vec<f64>)>,
+    pub(super) steps: Vec<Kept>,
 }
 
 impl Leg {
     /// Times of both ends.
     pub(super) fn ends(&self) -> [f64; 2] {
-        let time = |step: Option<&([f64; 2], Vec<f64>)>, end: usize| step.map_or(f64::NAN, |(times, _)| times[end]);
+        let time = |step: Option<&Kept>, end: usize| step.map_or(f64::NAN, |(times, _)| times[end]);
         [time(self.steps.first(), 0), time(self.steps.last(), 1)]
     }
 
@@ -290,9 +296,9 @@ impl<'a> Located<'a> {
                 all.push((Met::Surface(switch), direction));
             }
         }
-        let values: Vec<Box<dyn Fn(f64, &[f64]) -> f64 + '_>> = all
+        let values: Vec<Value<'_>> = all
             .iter()
-            .map(|(met, _)| -> Box<dyn Fn(f64, &[f64]) -> f64 + '_> {
+            .map(|(met, _)| -> Value<'_> {
                 match *met {
                     Met::Surface(switch) => Box::new(move |t, x| self.switches(&x[..n], t)[switch]),
                     // The push to the surface from the side.
@@ -309,7 +315,8 @@ impl<'a> Located<'a> {
             .with_step_limit(STEPS)
             .with_longest_step(longest);
         let mut astray = None;
-        let (mut met, mut steps): (Option<(Met, f64, Vec<f64>)>, Vec<([f64; 2], Vec<f64>)>) = (None, Vec::new());
+        let mut met: Option<(Met, f64, Vec<f64>)> = None;
+        let mut steps: Vec<Kept> = Vec::new();
         let arrival = integrator.trajectory(&start, span, &sections, &mut |passage| match passage {
             Passage::Crossing(crossing) => {
                 let own = all[crossing.section].0;
