@@ -1,8 +1,9 @@
 //! Cycles with impacts, against closed forms and against multiple shooting with event location.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point, Solution};
 use foldline::explore::{self, System};
+use foldline::verify::{Quantity, Verified, verify};
 use foldline_store::study_file::parse_study;
 
 /// One impact per period with d = 1, in closed form: the flight is that of the linear oscillator.
@@ -28,9 +29,17 @@ const ROTOR: &str = "name = \"rigid ring\"\n[parameters]\nOmega = 6\ne = 0.8\nze
 
 #[track_caller]
 fn run(model: &str, study: &str) -> Diagram {
+    with_run(model, study, |diagram, _| diagram)
+}
+
+/// A diagram, and a function that verifies some points of one.
+#[track_caller]
+fn with_run<R>(model: &str, study: &str, act: impl FnOnce(Diagram, &dyn Fn(&Diagram, usize) -> Verified) -> R) -> R {
     let text = format!("model = \"m\"\n{study}");
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    act(diagram, &|diagram, sample| verify(&system, diagram, study.plan.tolerance, Some(sample), &|_| true))
 }
 
 #[track_caller]
@@ -145,4 +154,141 @@ fn an_autonomous_oscillator_leaves_its_stop() {
     // There d is the amplitude of the cycle without impacts.
     let free = own.points.iter().find(|point| point.parameters[1] > 2.1).unwrap();
     assert!((own.special[0].point.parameters[1] - free.ranges[0][1]).abs() < 1e-7);
+}
+
+/// A cycle with impacts is recomputed by shooting through its events, and a changed number is found.
+#[test]
+fn cycles_with_impacts_are_verified() {
+    let study = format!("{SEED}range = [0.9, 2]\n");
+    with_run(&oscillator(1.0, 0.8), &study, |diagram, verified| {
+        let right = verified(&diagram, 6);
+        assert_eq!(right.wrong().count(), 0, "{:?}", right.wrong().next());
+        // The fold and the impact grazing are located again.
+        assert!(right.points == 6 && right.special == 2, "{} {} {:?}", right.points, right.special, right.undecided);
+        let changes: [(Quantity, fn(&mut Point)); 4] = [
+            (Quantity::Spectrum, |point| point.spectrum[0] += 1e-6),
+            (Quantity::Range, |point| point.ranges[0][0] += 1e-6),
+            (Quantity::Profile, |point| {
+                let Solution::Cycle(cycle) = &mut point.solution else { return };
+                cycle.profile[4] += 1e-6;
+            }),
+            // The velocity after an impact: it is none any more.
+            (Quantity::Events, |point| {
+                let Solution::Cycle(cycle) = &mut point.solution else { return };
+                let block = 2 * (cycle.degree + 1);
+                let jump = |j: usize| (cycle.profile[j * block + 1] - cycle.profile[j * block - 1]).abs();
+                let after = (1..cycle.intervals()).max_by(|a, b| jump(*a).total_cmp(&jump(*b))).unwrap();
+                cycle.profile[after * block + 1] += 1e-3;
+            }),
+        ];
+        for (quantity, change) in changes {
+            let mut other = diagram.clone();
+            other.branches[0].special.clear();
+            other.branches[0].points.retain(|point| point.position == 2);
+            change(&mut other.branches[0].points[0]);
+            let found = verified(&other, 1);
+            assert!(found.wrong().any(|check| check.quantity == quantity), "{quantity:?} {:?}", found.undecided);
+        }
+        let mut other = diagram.clone();
+        other.branches[0].points.truncate(1);
+        other.branches[0].special.retain(|own| own.kind == Kind::ImpactGrazing);
+        other.branches[0].special[0].point.parameters[0] += 1e-5;
+        let found = verified(&other, 1);
+        assert!(found.wrong().any(|check| check.quantity == Quantity::Place), "{:?}", found.undecided);
+    });
+}
+
+/// Cycles that stick, and cycles that slip throughout, against shooting with Filippov's field.
+#[test]
+fn cycles_with_friction_are_verified() {
+    let model = "name = \"friction\"\n[parameters]\nw = 0.6\n[forcing]\nfrequency = \"w\"\n[states.\"x''\"]\n\
+        equation = \"1.5*cos(w*t) - 0.1*x' - x - sign(x')\"\nrange = [-2, 2]\nvelocity = { range = [-2, 2] }\n";
+    with_run(model, &format!("{SEED}range = [0.6, 0.9]\n"), |diagram, verified| {
+        let found = verified(&diagram, 4);
+        assert_eq!(found.wrong().count(), 0, "{:?}", found.wrong().next());
+        assert_eq!(found.points, 4, "{:?}", found.undecided);
+    });
+}
+
+/// Values of the first and second parameter along a curve where it passes a value of the second.
+fn marked(diagram: &Diagram, curve: &str, first: usize) -> Vec<f64> {
+    let own = branch(diagram, curve);
+    own.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| s.point.parameters[first]).collect()
+}
+
+/// Folds and doublings in two parameters against closed forms: one impact in q periods of a linear oscillator is a
+/// system of two equations.
+#[test]
+fn curves_in_two_parameters_are_those_of_the_closed_form() {
+    // From either of two starts, in both directions.
+    for e in [0.8, 0.75] {
+        let study = format!(
+            "{SEED}range = [0.95, 2]\n[[curve]]\nname = \"folds\"\nof = \"b\"\nhold = \"fold\"\nfree = \"e\"\n\
+             range = [0.7, 0.85]\nmark = {{ e = [0.7] }}\n"
+        );
+        let diagram = run(&oscillator(1.0, e), &study);
+        let known = [1.703_193_808_401_04];
+        let found = marked(&diagram, "folds", 0);
+        assert_eq!(found.len(), known.len(), "{found:?}");
+        assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
+    }
+    let doublings = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 2\n\
+        parameters = { w = 0.95 }\nsamples = 32\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\n\
+        range = [0.935, 0.96]\n[[curve]]\nname = \"doublings\"\nof = \"b\"\nhold = \"period-doubling\"\n\
+        free = \"e\"\nrange = [0.69, 0.75]\nbranch-range = [0.9, 1]\nmark = { e = [0.75] }\n";
+    let found = marked(&run(&oscillator(0.3, 0.7), doublings), "doublings", 0);
+    let known = [0.950_865_914_101_461];
+    assert_eq!(found.len(), known.len(), "{found:?}");
+    assert!(found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
+}
+
+/// A curve of impact grazings is the amplitude of the linear oscillator.
+#[test]
+fn impact_grazings_of_a_linear_oscillator() {
+    let study = format!(
+        "{SEED}range = [0.95, 2]\n[[curve]]\nname = \"grazings\"\nof = \"b\"\nhold = \"impact-grazing\"\n\
+         free = \"A\"\nrange = [0.5, 1.5]\nbranch-range = [1.1, 2]\n"
+    );
+    let diagram = run(&oscillator(1.0, 0.8), &study);
+    let own = branch(&diagram, "grazings");
+    assert!(own.points.len() > 4);
+    for point in &own.points {
+        let [w, a] = [point.parameters[0], point.parameters[2]];
+        let linear = (1.0 - w * w).hypot(0.1 * w);
+        assert!((a - linear).abs() < 1e-8, "{w} {a} {linear}");
+    }
+}
+
+/// Beyond the second touch the branch goes on with two impacts instead of turning back to one, at any tolerance; and the
+/// curve of these grazings is that of cycles with one impact.
+#[test]
+fn a_branch_goes_on_away_from_a_grazing() {
+    let study = format!(
+        "{SEED}range = [0.69, 1.02]\n[[curve]]\nname = \"touches\"\nof = \"b\"\nhold = \"impact-grazing\"\nfree = \"e\"\n\
+         range = [0.75, 0.85]\nbranch-range = [0.6, 1.1]\nmark = {{ e = [0.75, 0.85] }}\n"
+    );
+    let diagram = run(&oscillator(1.0, 0.8), &study);
+    let kinds: Vec<Kind> = branch(&diagram, "b").special.iter().map(|special| special.kind).collect();
+    assert_eq!(kinds, [Kind::Fold, Kind::ImpactGrazing]);
+    let found = marked(&diagram, "touches", 0);
+    // Closed form with the maximum of the flight.
+    let known = [0.701_313_209_832_74, 0.707_252_536_774_21];
+    assert!(found.len() == 2 && found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-8), "{found:?}");
+}
+
+/// Torus points: the product of the multipliers of one impact per period is e² exp(-c T).
+#[test]
+fn torus_points_of_cycles_with_impacts() {
+    let study = format!(
+        "{}range = [0.8, 0.9]\n[[curve]]\nname = \"torus\"\nof = \"b\"\nhold = \"torus\"\nfree = \"w\"\n\
+         range = [1.05, 1.15]\n",
+        SEED.replace("\"w\"", "\"e\"").replace("samples = 8", "samples = 8\nparameters = { w = 1.1, c = -0.05 }")
+    );
+    let diagram = run(&oscillator(1.0, 0.8), &study);
+    let own = diagram.branch("torus").unwrap();
+    assert!(own.points.len() > 2, "{:?}", own.ends);
+    for point in &own.points {
+        let [w, e] = [point.parameters[0], point.parameters[4]];
+        assert!((e - (-0.05 * std::f64::consts::PI / w).exp()).abs() < 1e-8, "{w} {e}");
+    }
 }

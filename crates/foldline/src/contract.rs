@@ -575,6 +575,11 @@ pub trait Condition {
     /// Evaluates g. Returns false if its values are not finite there.
     fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
 
+    /// Why [`Condition::evaluate`] has no value at these extra unknowns, where it is not that g is not finite.
+    fn obstacle(&self, _extra: &[f64]) -> Option<&'static str> {
+        None
+    }
+
     /// Derivative of g along (`du`, `extra`) at the point of the last evaluation; writes as many values as g has.
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
 

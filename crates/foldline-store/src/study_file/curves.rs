@@ -25,13 +25,14 @@ pub(super) const KEYS: [&str; 13] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 9] = [
+const HELD: [Kind; 10] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
     Kind::PeriodDoubling,
     Kind::Torus,
     Kind::Grazing,
+    Kind::ImpactGrazing,
     Kind::BoundaryEquilibrium,
     Kind::Homoclinic,
     Kind::Heteroclinic,
@@ -108,7 +109,7 @@ pub(super) fn read(
     });
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
-        Kind::PeriodDoubling | Kind::Torus | Kind::Grazing => Some(Family::Cycle),
+        Kind::PeriodDoubling | Kind::Torus | Kind::Grazing | Kind::ImpactGrazing => Some(Family::Cycle),
         Kind::Homoclinic | Kind::Heteroclinic => Some(Family::Arc),
         Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
@@ -214,7 +215,7 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         (Kind::BoundaryEquilibrium, Some(Family::Cycle)) => {
             Some(("cycles touch a switching surface in grazings", "grazing"))
         }
-        (Kind::Grazing, Some(Family::Equilibrium)) => {
+        (Kind::Grazing | Kind::ImpactGrazing, Some(Family::Equilibrium)) => {
             Some(("equilibria meet a switching surface in boundary equilibria", "boundary-equilibrium"))
         }
         _ => None,

@@ -333,20 +333,18 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
     }
     designs::refuse(walk, root, "models with events");
     let kinks = model.switch_count() - events;
-    for (key, message, hint) in [
-        (
-            "explore",
-            "models with events are not explored",
-            "start a `[[branch]]` at a `[[seed]]`, and switch at its period doublings",
-        ),
-        (
-            "curve",
-            "curves in two parameters are not followed for models with events",
-            "repeat the branch at several values of the second parameter",
-        ),
-    ] {
-        for (span, _) in walk.tables(root, key) {
-            walk.report(span, message, hint);
+    for (span, _) in walk.tables(root, "explore") {
+        let hint = "start a `[[branch]]` at a `[[seed]]`, and switch at its period doublings";
+        walk.report(span, "models with events are not explored", hint);
+    }
+    for (_, table) in walk.tables(root, "curve") {
+        let Some(value) = table.get("hold") else { continue };
+        if matches!(
+            value.as_ref().as_str(),
+            Some("branch-point" | "boundary-equilibrium" | "homoclinic" | "heteroclinic")
+        ) {
+            let message = "curves of this kind are not followed for models with events";
+            walk.report(value.span(), message, "fold, period-doubling, torus, hopf or impact-grazing");
         }
     }
     for (span, table) in walk.tables(root, "branch") {

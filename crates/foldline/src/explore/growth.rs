@@ -152,10 +152,14 @@ pub fn surface<'a>(
     doubled: bool,
 ) -> Box<dyn ZeroProblem + 'a> {
     let setting = setting_of(system, axes, point);
-    if let Solution::Cycle(cycle) = &point.solution
-        && let Some(problem) = ImpactProblem::like(setting.clone(), cycle)
-    {
-        return Box::new(problem);
+    if let Solution::Cycle(cycle) = &point.solution {
+        let with_events = match kind {
+            Some(Kind::ImpactGrazing) => ImpactProblem::besides_grazing(setting.clone(), cycle),
+            _ => ImpactProblem::like(setting.clone(), cycle),
+        };
+        if let Some(problem) = with_events {
+            return Box::new(problem);
+        }
     }
     match &point.solution {
         solution if system.field.iterated() => Box::new(MapProblem::like(setting, solution)),
@@ -444,6 +448,11 @@ impl Growth<'_> {
             _ => return true,
         };
         let Some(start) = branch.points.first().filter(|_| !self.system.field.iterated()) else { return true };
+        if self.system.field.event_count() > 0 {
+            let note =
+                format!("{sought} points are not searched for: normal forms of cycles with events are not computed");
+            return self.tell(Event::Note(&branch.name, &note));
+        }
         let own = setting(self.system, branch.free, &start.parameters);
         let count = special::cycle_form::switches_passed(&own, start);
         let note = format!(
@@ -609,8 +618,12 @@ impl Growth<'_> {
             if branch.family == Family::Cycle {
                 marks.extend(sliding::monitors(system.field));
             }
-            if branch.held.is_none() {
-                marks.extend(impact::monitors(system.field, branch.family == Family::Cycle));
+            match branch.held {
+                None => marks.extend(impact::monitors(system.field, branch.family == Family::Cycle)),
+                Some((kind, _)) if branch.family == Family::Cycle => {
+                    marks.extend(impact::on_curves(system.field, kind == Kind::ImpactGrazing));
+                }
+                Some(_) => {}
             }
         }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none());
@@ -676,7 +689,9 @@ impl Growth<'_> {
                         return Verdict::Continue;
                     }
                     let plain = special.clone();
-                    if special.kind == Kind::ImpactGrazing {
+                    if special.kind == Kind::ImpactGrazing && branch.held.is_some() {
+                        special.remark = "the sequence of events of this curve ends".into();
+                    } else if special.kind == Kind::ImpactGrazing {
                         let found =
                             beside_impacts::beyond(&system, self.settings, branch.free, &special.point, direction);
                         let next = found.as_ref().map(|(_, next)| next);

@@ -295,14 +295,38 @@ pub(super) fn beyond<'a>(
             let guess = u.iter().zip(&row).map(|(u, t)| u + distance * t).collect();
             let plane = Plane { row, base: u.clone(), distance };
             let found = settle(&mut *problem, settings, plane, guess, side, &mut Cost::default());
-            if let Ok(found) = found
+            if let Ok(mut found) = found
                 && inadmissible(field, &found.point).is_none()
             {
+                if approaches(&*problem, field, &found, vanishes.is_none()) {
+                    found.tangent.iter_mut().for_each(|t| *t = -*t);
+                    found.point.tangent.iter_mut().for_each(|t| *t = -*t);
+                }
                 return Some((problem, found));
             }
         }
     }
     None
+}
+
+/// True if the tangent at a point beside a grazing leads to it: with a new event, to where that loses its speed, else
+/// to where the surface is touched.
+fn approaches(problem: &dyn ZeroProblem, field: &dyn VectorField, found: &Station, gained: bool) -> bool {
+    /// Length of the step that decides, in scaled variables.
+    const STEP: f64 = 1e-5;
+    let value = |by: f64| {
+        let u: Vec<f64> = found.u.iter().zip(&found.tangent).map(|(u, t)| u + by * t).collect();
+        let at = problem.point(&u, &found.tangent, Examination::default());
+        let Solution::Cycle(cycle) = &at.solution else { return f64::NAN };
+        match gained {
+            false => -highest(field, &at.parameters, cycle).value,
+            true => {
+                let all = impacts(field, &at.parameters, cycle);
+                all.iter().map(|own| speed(field, &at.parameters, cycle, own)).fold(f64::INFINITY, f64::min)
+            }
+        }
+    };
+    value(STEP) < value(-STEP)
 }
 
 fn of_flights<'a>(

@@ -293,7 +293,8 @@ impl ZeroProblem for Held<'_> {
     }
 
     fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
-        self.surface.obstacle(&u[self.extra()..])
+        let (extra, rest) = u.split_at(self.extra());
+        self.surface.obstacle(rest).or_else(|| self.condition.obstacle(extra))
     }
 
     fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
@@ -469,7 +470,18 @@ impl ZeroProblem for Held<'_> {
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         let mut u = self.condition.guess(point);
+        let from = self.surface.mesh();
         u.extend(self.surface.unknowns_of(point));
+        // Cycles with events bring the mesh of their flights.
+        let mesh = self.surface.mesh();
+        if from != mesh {
+            self.condition.set_mesh(&mesh);
+            self.rows = generic(self.freedom * self.surface.unknowns());
+            self.tangents.clear();
+            self.tangents_at.clear();
+            self.nulls_at.clear();
+            (self.known, self.adapted) = (None, false);
+        }
         u
     }
 }

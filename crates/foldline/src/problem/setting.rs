@@ -140,6 +140,17 @@ impl Setting<'_> {
         [h, hx, self.gathered(&each, count, 1), ht]
     }
 
+    /// The state after an event at one point and its derivatives with respect to the states, the unknowns λ and time; see
+    /// [`VectorField::reset`].
+    pub fn reset(&self, event: usize, batch: Batch) -> [Vec<f64>; 4] {
+        let n = self.field.dim();
+        let (_, columns) = self.columns();
+        let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
+        let [mut r, mut rx, mut each, mut rt] = [1, n, free.len(), 1].map(|size| vec![0.0; n * size]);
+        self.field.reset(event, batch, &free, [&mut r, &mut rx, &mut each, &mut rt]);
+        [r, rx, self.gathered(&each, n, 1), rt]
+    }
+
     /// The conditions at both ends of a boundary-value problem and their derivatives with respect to the states and the
     /// unknowns λ; see [`VectorField::boundary`].
     pub fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64]) -> [Vec<f64>; 4] {

@@ -68,7 +68,12 @@ pub fn monitors<'a>(
         _ => &[],
     };
     let monitor = |&kind: &Kind| Box::new(CodimensionTwo { field, scales, held, kind }) as Box<dyn Monitor + 'a>;
-    kinds.iter().map(monitor).collect()
+    // Normal forms of cycles with events are not computed, and their torus points end before strong resonances.
+    let strong = |kind: &Kind| held == Torus && matches!(kind, Resonance11 | Resonance12);
+    let formed = |kind: &&Kind| {
+        field.event_count() == 0 || !(matches!(kind, GeneralisedPeriodDoubling | Chenciner) || strong(kind))
+    };
+    kinds.iter().filter(formed).map(monitor).collect()
 }
 
 impl CodimensionTwo<'_> {

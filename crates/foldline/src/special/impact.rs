@@ -22,17 +22,20 @@
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Ending, Kind, Point, Solution};
 use crate::linalg::dot;
-use crate::problem::impact::stored::{Impact, impacts, surfaces, times_of};
+use crate::problem::impact::stored::{Impact, hard, impacts, surfaces, times_of};
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours.
 const SECTIONS: usize = 8;
+/// Distance of places, in intervals, up to which they are the same.
+const SAME_PLACE: f64 = 1e-3;
 /// Rounds of parabolas about a maximum.
 const ROUNDS: usize = 6;
 
-/// Monitor of (1), or of (2).
+/// Monitor of (1), or of (2); `held` if one of the maxima (2) is zero all along a curve.
 struct Grazes<'a> {
     field: &'a dyn VectorField,
     touches: bool,
+    held: bool,
 }
 
 /// Monitor of equilibria on the surface of an event.
@@ -47,9 +50,17 @@ pub fn monitors<'a>(field: &'a dyn VectorField, cycles: bool) -> Vec<Box<dyn Mon
         return Vec::new();
     }
     match cycles {
-        true => [false, true].map(|touches| Box::new(Grazes { field, touches }) as Box<dyn Monitor>).into(),
+        true => on_curves(field, false),
         false => (0..field.event_count()).map(|event| Box::new(Rests { field, event }) as Box<dyn Monitor>).collect(),
     }
+}
+
+/// Monitors for cycles along a curve in two parameters, on which one of the maxima (2) is zero if `held`.
+pub fn on_curves<'a>(field: &'a dyn VectorField, held: bool) -> Vec<Box<dyn Monitor + 'a>> {
+    if field.event_count() == 0 {
+        return Vec::new();
+    }
+    [false, true].map(|touches| Box::new(Grazes { field, touches, held }) as Box<dyn Monitor>).into()
 }
 
 /// The events of a cycle.
@@ -160,7 +171,12 @@ pub(crate) struct Highest {
 
 /// The largest of the maxima (2).
 pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Highest {
-    let all = impacts(field, parameters, cycle);
+    highest_but(field, parameters, cycle, false)
+}
+
+/// The largest of the maxima (2) or, if `held`, of all but the one closest to zero.
+fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held: bool) -> Highest {
+    let all = if held { hard(field, parameters, cycle) } else { impacts(field, parameters, cycle) };
     let (n, count, scheme) = (cycle.dim(), cycle.intervals(), cycle.scheme());
     let block = (cycle.degree + 1) * n;
     let at = |place: f64| -> Vec<f64> {
@@ -180,7 +196,7 @@ pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
             (0..all.len()).map(|k| [end(k), end(k + 1)]).collect()
         }
     };
-    let (mut most, mut size, mut where_) = (f64::NEG_INFINITY, 0.0f64, (0.0, 0));
+    let (mut found, mut size): (Vec<(f64, f64, usize)>, f64) = (Vec::new(), 0.0);
     for [first, last] in flights {
         let places: Vec<f64> = (first * SECTIONS..last * SECTIONS)
             .map(|k| k as f64 / SECTIONS as f64)
@@ -200,14 +216,23 @@ pub(crate) fn highest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
                     let course = |place: f64| sign * at(place)[event];
                     let around = [places[k - 1], places[k], places[k + 1]];
                     let (place, value) = refined(around, own[k], &course);
-                    if value > most {
-                        (most, where_) = (value, (place, event));
-                    }
+                    found.push((value, place, event));
                 }
             }
         }
     }
-    let (place, event) = where_;
+    let closest = found.iter().copied().min_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+    if let Some((_, own, event)) = closest.filter(|_| held) {
+        // Without events the period is searched a little beyond its end.
+        let apart = |place: f64| {
+            let off = (place - own).rem_euclid(count as f64);
+            off.min(count as f64 - off)
+        };
+        found.retain(|other| other.2 != event || apart(other.1) > SAME_PLACE);
+    }
+    // Of equal ones the first counts.
+    let higher = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
+    let (most, place, event) = found.into_iter().fold((f64::NEG_INFINITY, 0.0, 0), higher);
     let j = (place.floor() as usize) % count;
     let time = cycle.mesh[j] + (place - place.floor()) * (cycle.mesh[j + 1] - cycle.mesh[j]);
     Highest { value: if most.is_finite() { most } else { -size }, size, time, event }
@@ -257,9 +282,14 @@ impl Monitor for Grazes<'_> {
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let Solution::Cycle(cycle) = &at.solution else { return f64::NAN };
         if self.touches {
-            return -highest(self.field, &at.parameters, cycle).value;
+            return -highest_but(self.field, &at.parameters, cycle, self.held).value;
         }
-        let least = speeds(self.field, &at.parameters, cycle).into_iter().fold(f64::INFINITY, f64::min);
+        let all = match self.held {
+            true => hard(self.field, &at.parameters, cycle),
+            false => impacts(self.field, &at.parameters, cycle),
+        };
+        let speed = |own: &Impact| speed(self.field, &at.parameters, cycle, own);
+        let least = all.iter().map(speed).fold(f64::INFINITY, f64::min);
         if least.is_finite() { least } else { 1.0 }
     }
 

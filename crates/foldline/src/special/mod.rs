@@ -38,6 +38,7 @@ pub mod on_connections;
 pub mod on_cycle_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
+pub mod on_impacts;
 pub mod on_levels;
 pub mod on_maps;
 pub mod on_surfaces;

@@ -66,10 +66,17 @@ impl<'a> OnSurfaces<'a> {
         };
         let fits = match at {
             Solution::Equilibrium(_) => kind == Kind::BoundaryEquilibrium,
-            Solution::Cycle(_) => kind == Kind::Grazing,
+            Solution::Cycle(_) => matches!(kind, Kind::Grazing | Kind::ImpactGrazing),
             Solution::Torus(_) => false,
         };
-        let switch = (0..count).filter(|_| fits).min_by(|a, b| {
+        // The switches of events are the last ones.
+        let kinks = count - field.event_count();
+        let own = match kind {
+            Kind::ImpactGrazing => kinks..count,
+            Kind::Grazing => 0..kinks,
+            _ => 0..count,
+        };
+        let switch = own.filter(|_| fits).min_by(|a, b| {
             let value = |switch: &usize| least(*switch).unwrap_or(f64::INFINITY);
             value(a).total_cmp(&value(b))
         })?;

@@ -9,15 +9,18 @@
 //! | topic | file |
 //! |---|---|
 //! | nearest solution by shooting | `shooting`, `variational` |
+//! | cycles along which f or the state jumps | `located`, `jumping` |
 //! | single points | `points` |
 //! | cycles of maps, by the composed map | `maps` |
-//! | positions of special points | `special` |
+//! | positions of special points | `special`, `touching` |
 //! | changes of stability | `record` |
 //!
-//! **Fails when** the integration itself is not accurate enough: stiff equations, or a discontinuous right-hand side.
+//! **Fails when** the integration itself is not accurate enough: stiff equations, or trajectories that only touch a surface.
 //! Undecided cases are counted and reported as such, not as passed.
 
 mod arcs;
+mod jumping;
+mod located;
 mod maps;
 mod points;
 mod record;
@@ -25,6 +28,7 @@ mod shooting;
 mod special;
 #[cfg(test)]
 mod tests;
+mod touching;
 mod variational;
 
 use crate::diagram::{Branch, Diagram, Family, Kind, Solution};
@@ -47,19 +51,22 @@ pub enum Quantity {
     Stability,
     /// Parameter at a special point, relative to 1 + its size.
     Place,
+    /// Instants of the events of a cycle, relative to the period; infinite if their number differs.
+    Events,
     /// Discrepancy in the number of unstable multipliers from one point to the next.
     Record,
 }
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Quantity; 7] = [
+    pub const ALL: [Quantity; 8] = [
         Quantity::Profile,
         Quantity::Period,
         Quantity::Range,
         Quantity::Spectrum,
         Quantity::Stability,
         Quantity::Place,
+        Quantity::Events,
         Quantity::Record,
     ];
 
@@ -72,6 +79,7 @@ impl Quantity {
             Quantity::Spectrum => "spectrum",
             Quantity::Stability => "stability",
             Quantity::Place => "location",
+            Quantity::Events => "events",
             Quantity::Record => "consistency",
         }
     }
@@ -179,12 +187,8 @@ pub fn verify(
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
         let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
-        let refused = match system.field.event_count() {
-            0 if branch.family == Family::Torus => Some("tori are not recomputed yet"),
-            0 => None,
-            _ => Some("solutions of models with events are not recomputed yet"),
-        };
-        if let Some(why) = refused {
+        if branch.family == Family::Torus {
+            let why = "tori are not recomputed yet";
             let undecided = |position: i64, special: Option<Kind>| Undecided {
                 branch: branch.name.clone(),
                 position,

@@ -4,6 +4,7 @@
 //!
 //!   (1)  Σ λᵏ = tr Jᵏ
 
+use super::jumping;
 use super::shooting::{Orbit, Shooting, Solved};
 use super::{Check, Quantity, Undecided, Verified, accuracies, of_cycles};
 use crate::contract::{Batch, Parameters, VectorField};
@@ -17,9 +18,9 @@ use num_complex::Complex64;
 
 /// Relative distance beyond which a solution found counts as another one: along a branch, and along a curve in two
 /// parameters, near which there is a surface of solutions.
-const ELSEWHERE: [f64; 2] = [0.1, 1e-3];
+pub(super) const ELSEWHERE: [f64; 2] = [0.1, 1e-3];
 /// Relative rounding error of a comparison.
-const ROUNDING: f64 = 1e-11;
+pub(super) const ROUNDING: f64 = 1e-11;
 /// Number of Newton steps in twice the working precision: the matrix is that of the point, and each step gains several
 /// digits.
 const STEPS: usize = 4;
@@ -53,43 +54,39 @@ pub(super) fn verify(
     out
 }
 
-/// Reason why cycles with jumps are not recomputed.
-pub(super) const JUMPS: &str = "f jumps along it, and the variational equations are not integrated across jumps";
-
-struct Part<'a> {
+pub(super) struct Part<'a> {
     system: &'a System<'a>,
-    setting: &'a Setting<'a>,
+    pub(super) setting: &'a Setting<'a>,
     branch: &'a Branch,
 }
 
 impl Part<'_> {
-    fn check(&self, point: &Point, quantity: Quantity, stated: Option<f64>, found: f64) -> Check {
+    pub(super) fn check(&self, point: &Point, quantity: Quantity, stated: Option<f64>, found: f64) -> Check {
         let parameter = point.parameters.get(self.branch.free).copied().unwrap_or(f64::NAN);
         let (branch, position) = (self.branch.name.clone(), point.position);
         Check { branch, position, special: None, parameter, quantity, stated, found }
     }
 
     /// True if the points are solutions in several free parameters.
-    fn in_several_parameters(&self) -> bool {
+    pub(super) fn in_several_parameters(&self) -> bool {
         self.branch.held.is_some() || !self.branch.also.is_empty()
     }
 
-    fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
+    pub(super) fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
         Undecided { branch: self.branch.name.clone(), position: point.position, special: None, why }
     }
 
     fn cycles(&self, points: &[&Point], [accuracy, coarser]: [f64; 2], out: &mut Verified) {
-        let [shooting, coarse] = [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy });
+        let [shooting, coarse] =
+            [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy, ignored: None });
         let (mut own, mut orbits) = (Vec::new(), Vec::new());
         for point in points {
-            if let Solution::Cycle(cycle) = &point.solution
-                && sliding::meets_jump(self.setting.field, &point.parameters, cycle)
-            {
-                out.undecided.push(self.undecided(point, JUMPS));
-                continue;
-            }
             if self.joins(point) {
                 out.undecided.push(self.undecided(point, "two branches meet there, and shooting is singular"));
+                continue;
+            }
+            if jumps(self.setting.field, point) {
+                jumping::verify(self, point, [accuracy, coarser], out);
                 continue;
             }
             match Orbit::of(self.setting, point) {
@@ -149,7 +146,13 @@ impl Part<'_> {
 
     /// Stated error and actual difference of the range, relative to its size, of the state or output for which their
     /// ratio is worst. Outputs are also allowed the effect of the error of the states.
-    fn range_difference(&self, point: &Point, ranges: &[[f64; 2]], stated: f64, passed_on: &[f64]) -> (f64, f64) {
+    pub(super) fn range_difference(
+        &self,
+        point: &Point,
+        ranges: &[[f64; 2]],
+        stated: f64,
+        passed_on: &[f64],
+    ) -> (f64, f64) {
         let n = self.system.scales.len();
         // An angle that turns takes all values.
         let turns = |c: usize| point.solution.gain().get(c).is_some_and(|gain| *gain != 0.0);
@@ -163,7 +166,7 @@ impl Part<'_> {
         each.max_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0))).unwrap_or((stated, 0.0))
     }
 
-    fn multipliers(&self, point: &Point, solved: &Solved, rough: &Solved, out: &mut Verified) {
+    pub(super) fn multipliers(&self, point: &Point, solved: &Solved, rough: &Solved, out: &mut Verified) {
         let [found, other] = [solved, rough].map(|solved| solved.flow.free_multipliers(&solved.orbit));
         let found = &found[..];
         let noise = matched(found, &other).iter().fold(ROUNDING, |m, (a, b)| larger(m, (a - b).norm()));
@@ -321,6 +324,13 @@ impl Part<'_> {
     }
 }
 
+/// True if f or the state jumps along a cycle.
+pub(super) fn jumps(field: &dyn VectorField, point: &Point) -> bool {
+    let Solution::Cycle(cycle) = &point.solution else { return false };
+    // Whether a stored cycle of a model with events has some is to be found out.
+    field.event_count() > 0 || sliding::meets_jump(field, &point.parameters, cycle)
+}
+
 /// Pairs each of `a` with one of `b`, always taking the closest remaining pair, relative to its size.
 fn matched(a: &[Complex64], b: &[Complex64]) -> Vec<(Complex64, Complex64)> {
     let mut rest: Vec<Complex64> = b.to_vec();
@@ -365,19 +375,19 @@ impl Seen {
 }
 
 /// Integrated cycle.
-struct Path {
+pub(super) struct Path {
     /// Normalised, starting at 0.
-    times: Vec<f64>,
+    pub(super) times: Vec<f64>,
     /// `[n × times]`.
-    states: Vec<f64>,
+    pub(super) states: Vec<f64>,
 }
 
 /// Flow to which a path belongs.
 #[derive(Clone, Copy)]
-struct Along<'a> {
-    field: &'a dyn VectorField,
-    parameters: &'a [f64],
-    orbit: &'a Orbit,
+pub(super) struct Along<'a> {
+    pub(super) field: &'a dyn VectorField,
+    pub(super) parameters: &'a [f64],
+    pub(super) orbit: &'a Orbit,
 }
 
 impl Along<'_> {
@@ -397,7 +407,7 @@ impl Along<'_> {
 
 impl Path {
     /// Largest change of each output if all states change by `error`, relative to their scales.
-    fn passed_on(&self, along: Along, error: f64) -> Vec<f64> {
+    pub(super) fn passed_on(&self, along: Along, error: f64) -> Vec<f64> {
         let (lanes, outputs) = (self.times.len(), along.outputs(&self.states, &self.times));
         let mut total = vec![0.0; outputs.len()];
         for (c, scale) in along.orbit.scales.iter().enumerate() {

@@ -19,6 +19,7 @@
 //!
 //! **Source.** ascher1995, §4.
 
+use super::located::{Ignored, Jump, Leg, Located};
 use super::variational::Variational;
 use crate::contract::{Batch, Parameters, Verdict};
 use crate::diagram::{Cycle, Point, Solution};
@@ -55,8 +56,12 @@ pub(super) struct Orbit {
     pub(super) scales: Vec<f64>,
     /// `[n]` increments of angles over the cycle; empty if none turns.
     pub(super) gain: Vec<f64>,
-    /// Mesh interval at which each segment begins, `[K]`.
+    /// Mesh interval at which each segment begins, `[K]`; empty if they begin elsewhere.
     pub(super) intervals: Vec<usize>,
+    /// Normalised time of the first node.
+    pub(super) begin: f64,
+    /// True if f or the state jumps along the cycle: see [`super::located`].
+    pub(super) jumps: bool,
 }
 
 impl Orbit {
@@ -81,6 +86,54 @@ impl Orbit {
             scales,
             gain: cycle.gain.clone(),
             intervals,
+            begin: 0.0,
+            jumps: false,
+        })
+    }
+
+    /// Orbit of a cycle along which f or the state jumps, with nodes away from all surfaces; an error says why there is
+    /// none.
+    pub(super) fn away_from_surfaces(setting: &Setting, point: &Point) -> Result<Orbit, &'static str> {
+        /// Least value of a switch, relative to its largest along the cycle.
+        const AWAY: f64 = 1e-3;
+        let Solution::Cycle(cycle) = &point.solution else { return Err("it is not a cycle") };
+        let (n, count, field) = (setting.field.dim(), cycle.intervals(), setting.field);
+        if count == 0 || cycle.dim() != n {
+            return Err("its profile was not stored");
+        }
+        let middle = |j: usize| 0.5 * (cycle.mesh[j] + cycle.mesh[j + 1]);
+        let unit = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+        let values: Vec<Vec<f64>> = (0..count)
+            .map(|j| {
+                let (mut h, x, times) = (vec![0.0; field.switch_count()], cycle.state(middle(j)), [unit * middle(j)]);
+                let times = if cycle.forcing_periods > 0 { &times[..] } else { &[] };
+                let parameters = Parameters::Shared(&point.parameters);
+                field.switches(Batch { lanes: 1, states: &x, parameters, times, signs: &[] }, &mut h);
+                h
+            })
+            .collect();
+        let size = |s: usize| values.iter().fold(0.0, |most: f64, h| most.max(h[s].abs()));
+        let sizes: Vec<f64> = (0..field.switch_count()).map(size).collect();
+        let away = |j: &usize| values[*j].iter().zip(&sizes).all(|(h, size)| h.abs() >= AWAY * size);
+        let safe: Vec<usize> = (0..count).filter(away).collect();
+        if safe.is_empty() {
+            return Err("no part of the cycle is away from all surfaces");
+        }
+        let segments = SEGMENTS.min(safe.len());
+        let places: Vec<f64> = (0..segments).map(|i| middle(safe[i * safe.len() / segments])).collect();
+        let ends = places[1..].iter().copied().chain([places[0] + 1.0]);
+        let shares = ends.zip(&places).map(|(end, begin)| end - begin).collect();
+        Ok(Orbit {
+            nodes: places.iter().flat_map(|t| cycle.state(*t)).collect(),
+            shares,
+            period: unit,
+            forced: cycle.forcing_periods > 0,
+            free: setting.unknowns_of(point),
+            scales: (0..n).map(|c| setting.scales[c] + largest(cycle, n, c)).collect(),
+            gain: cycle.gain.clone(),
+            intervals: Vec::new(),
+            begin: places[0],
+            jumps: true,
         })
     }
 
@@ -90,7 +143,7 @@ impl Orbit {
 
     /// `[K + 1]` times of the nodes and of the end, in the time of the field.
     pub(super) fn times(&self) -> Vec<f64> {
-        let mut times = vec![0.0];
+        let mut times = vec![self.begin * self.period];
         self.shares.iter().for_each(|share| times.push(times[times.len() - 1] + share * self.period));
         times
     }
@@ -133,6 +186,9 @@ pub(super) struct Flow {
     /// `[K][n]` f at the starts and ends of the segments.
     begins: Vec<f64>,
     finishes: Vec<f64>,
+    /// Jumps of the state and legs, of an orbit along which f or the state jumps.
+    pub(super) jumps: Vec<Jump>,
+    pub(super) legs: Vec<Leg>,
 }
 
 impl Flow {
@@ -170,9 +226,42 @@ pub(super) struct Shooting<'a> {
     pub(super) setting: &'a Setting<'a>,
     /// Relative accuracy of the integration.
     pub(super) accuracy: f64,
+    /// A surface that orbits with jumps do not meet.
+    pub(super) ignored: Option<Ignored>,
 }
 
 impl Shooting<'_> {
+    /// Flow along an orbit through its jumps; `None` if the integration fails.
+    pub(super) fn through_jumps(&self, orbit: &Orbit, ignored: Option<Ignored>) -> Option<Flow> {
+        let (n, scales) = (orbit.dim(), &orbit.scales);
+        let tolerance = Tolerance { relative: self.accuracy, absolute: self.absolute() };
+        let (parameters, forced) = (self.setting.at(&orbit.free), orbit.forced);
+        let located = Located { setting: self.setting, parameters, tolerance, forced, ignored };
+        let (mut flow, times) = (Flow::default(), orbit.times());
+        for (x, span) in orbit.nodes.chunks_exact(n).zip(times.windows(2)) {
+            let found = located.over(x, [span[0], span[1]], flow.jumps.len())?;
+            let scaled = found.along.iter().enumerate().map(|(at, m)| m * scales[at % n] / scales[at / n]);
+            flow.transitions.extend(scaled);
+            flow.ends.extend(found.end);
+            flow.by_free.extend(found.by_free);
+            flow.jumps.extend(found.jumps);
+            flow.legs.extend(found.legs);
+        }
+        flow.begins = self.slopes(&orbit.nodes, &times, orbit);
+        flow.finishes = self.slopes(&flow.ends, &times[1..], orbit);
+        Some(flow)
+    }
+
+    /// Errors accepted in the states, their derivatives and the clock.
+    fn absolute(&self) -> Vec<f64> {
+        let (n, k, scales) = (self.setting.field.dim(), self.setting.freedom(), self.setting.scales);
+        let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
+        let by_free = (0..n * k).map(|at| scales[at / k.max(1)]);
+        let clock = self.setting.field.forced().then_some(1.0);
+        let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
+        absolute.map(|s| s * self.accuracy).collect()
+    }
+
     /// Flow along each orbit; `None` if the integration fails. `sample` sees every step of every orbit.
     pub(super) fn flows(&self, orbits: &[&Orbit], sample: &mut dyn FnMut(usize, &Step)) -> Vec<Option<Flow>> {
         let (n, k) = (self.setting.field.dim(), self.setting.freedom());
@@ -190,13 +279,7 @@ impl Shooting<'_> {
                 owners.push(index);
             }
         }
-        let scales = self.setting.scales;
-        let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
-        let by_free = (0..n * k).map(|at| scales[at / k.max(1)]);
-        let clock = self.setting.field.forced().then_some(1.0);
-        let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
-        let absolute = absolute.map(|s| s * self.accuracy).collect();
-        let tolerance = Tolerance { relative: self.accuracy, absolute };
+        let tolerance = Tolerance { relative: self.accuracy, absolute: self.absolute() };
         let ensemble = Ensemble::with_own_parameters(&field, &parameters, tolerance, &starts, [0.0, 1.0]);
         let arrivals = ensemble.with_step_limit(STEPS).run(&mut |step| {
             sample(owners[step.trajectory()], step);
@@ -251,7 +334,10 @@ impl Shooting<'_> {
             if at.is_empty() {
                 break;
             }
-            let flows = self.flows(&at, &mut |_, _| {});
+            let flows = match at.iter().any(|orbit| orbit.jumps) {
+                true => at.iter().map(|orbit| self.through_jumps(orbit, self.ignored)).collect(),
+                false => self.flows(&at, &mut |_, _| {}),
+            };
             for (&i, flow) in open.iter().zip(flows) {
                 let Some(now) = current[i].take() else { continue };
                 let Some((update, kernel)) =

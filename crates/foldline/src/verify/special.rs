@@ -12,17 +12,18 @@
 //!   period doubling   (3)  μ + 1 of the multiplier closest to -1
 //!   torus             (4)  |μ| - 1 of the complex pair closest to the unit circle
 //!   Hopf              (5)  Re of the complex pair of eigenvalues closest to the imaginary axis
+//!   grazing           (6)  the extremum of the switch on orbits that do not meet its surface there
 //! ```
 //!
 //! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
+use super::touching::Touch;
 use super::{Check, Quantity, Undecided, Verified, accuracies, maps};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
 use crate::problem::Setting;
-use crate::special::sliding;
 use num_complex::Complex64;
 
 /// Distances between neighbouring solutions, in scaled unknowns, in the order in which they are tried.
@@ -46,14 +47,8 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
             special: Some(special.kind),
             why,
         };
-        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
-            out.undecided.push(undecided("grazings, sliding bifurcations and boundary equilibria are not recomputed"));
-            continue;
-        }
-        if let Solution::Cycle(cycle) = &special.point.solution
-            && sliding::meets_jump(setting.field, &special.point.parameters, cycle)
-        {
-            out.undecided.push(undecided(super::points::JUMPS));
+        if matches!(special.kind, Kind::Sliding | Kind::BoundaryEquilibrium) {
+            out.undecided.push(undecided("sliding bifurcations and boundary equilibria are not located again"));
             continue;
         }
         let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
@@ -93,6 +88,8 @@ struct Nearby {
     parameter: f64,
     slope: f64,
     spectrum: Vec<Complex64>,
+    /// Extremum of the switch at whose surface a cycle touches, 0 elsewhere.
+    touch: f64,
 }
 
 impl Place<'_> {
@@ -164,6 +161,7 @@ impl Place<'_> {
                 pairs.sort_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
                 pairs.first().map(|z| z.re)
             }
+            Kind::Grazing | Kind::ImpactGrazing => Some(nearby.touch),
             _ => None,
         }
     }
@@ -180,9 +178,15 @@ impl Place<'_> {
                 }
                 let each = nodes.iter().map(|distance| {
                     let (parameter, slope, spectrum) = maps::beside(self.setting, &self.special.point, *distance)?;
-                    Some(Nearby { parameter, slope, spectrum })
+                    Some(Nearby { parameter, slope, spectrum, touch: 0.0 })
                 });
                 Ok(each.collect())
+            }
+            Solution::Cycle(_)
+                if matches!(self.special.kind, Kind::Grazing | Kind::ImpactGrazing)
+                    || super::points::jumps(self.setting.field, &self.special.point) =>
+            {
+                self.jumping(nodes)
             }
             Solution::Cycle(cycle) => {
                 let base = Orbit::of(self.setting, &self.special.point).ok_or("its profile was not stored")?;
@@ -197,7 +201,7 @@ impl Place<'_> {
                 along.push(if base.forced { 0.0 } else { tangent[size] / base.period });
                 along.push(tangent[size + 1]);
                 normalise(&mut along);
-                let shooting = Shooting { setting: self.setting, accuracy: self.accuracy };
+                let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored: None };
                 let moved = |s: &f64| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>());
                 let orbits: Vec<Orbit> = nodes.iter().map(moved).collect();
                 // Each solution is sought in the plane through its initial guess.
@@ -207,11 +211,48 @@ impl Place<'_> {
                     let solved = solved?;
                     let spectrum = solved.flow.free_multipliers(&solved.orbit);
                     let slope = *solved.kernel.first()?.last()?;
-                    Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum })
+                    Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum, touch: 0.0 })
                 });
                 Ok(nearby.collect())
             }
         }
+    }
+
+    /// Cycles along which f or the state jumps; the direction of the branch is that of the shooting equations.
+    fn jumping(&self, nodes: &[f64; 4]) -> Result<Option<Vec<Nearby>>, &'static str> {
+        if self.special.kind == Kind::BranchPoint {
+            return Err("branch points of cycles with jumps are not located again");
+        }
+        let base = Orbit::away_from_surfaces(self.setting, &self.special.point)?;
+        let touch = match self.special.kind {
+            Kind::Grazing | Kind::ImpactGrazing => {
+                Some(Touch::of(self.setting, self.special.kind, &self.special.point).ok_or("it touches no surface")?)
+            }
+            _ => None,
+        };
+        let ignored = touch.map(|touch| touch.ignored(&base));
+        let shooting = Shooting { setting: self.setting, accuracy: self.accuracy, ignored };
+        let here = shooting.solve(std::slice::from_ref(&base), &[]).pop().flatten();
+        let Some(mut along) = here.and_then(|here| here.kernel.into_iter().next()) else {
+            return Err("shooting did not converge there");
+        };
+        normalise(&mut along);
+        let orbits: Vec<Orbit> =
+            nodes.iter().map(|s| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>())).collect();
+        let rows: Vec<Vec<Row>> = vec![vec![(along.clone(), 0.0)]; nodes.len()];
+        let each = shooting.solve(&orbits, &rows).into_iter().map(|solved| {
+            let solved = solved?;
+            // The flow that Newton's method leaves is that of its last iterate but one.
+            let flow = shooting.through_jumps(&solved.orbit, ignored)?;
+            let spectrum = flow.free_multipliers(&solved.orbit);
+            let slope = *solved.kernel.first()?.last()?;
+            let touch = match touch {
+                Some(touch) => touch.extremum(&shooting, &solved.orbit, &flow.legs)?,
+                None => 0.0,
+            };
+            Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum, touch })
+        });
+        Ok(each.collect())
     }
 
     fn equilibria(&self, x: &[f64], nodes: &[f64; 4]) -> Option<Vec<Nearby>> {
@@ -259,7 +300,7 @@ impl Place<'_> {
                 let mut kernel: Vec<f64> = right.iter().skip(1).step_by(2).copied().collect();
                 normalise(&mut kernel);
                 let spectrum = periodic_schur::eigenvalues(&fx, n)?.iter().map(|value| value.value()).collect();
-                return Some(Nearby { parameter: value, slope: kernel[n], spectrum });
+                return Some(Nearby { parameter: value, slope: kernel[n], spectrum, touch: 0.0 });
             }
             last = length;
             state.iter_mut().zip(scales).zip(&update).for_each(|((x, s), d)| *x += s * d);

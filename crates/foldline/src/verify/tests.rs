@@ -69,7 +69,8 @@ fn shooting_gives_the_multipliers_of_the_closed_form() {
     let (scales, parameters) = (vec![1.0, 1.0], point.parameters.clone());
     let setting = Setting { field: &model, scales: &scales, parameters, axes: vec![Axis::new(0, 1.0)] };
     let orbit = Orbit::of(&setting, point).unwrap();
-    let solved = Shooting { setting: &setting, accuracy: 1e-12 }.solve(&[orbit], &[]).pop().unwrap().unwrap();
+    let solved =
+        Shooting { setting: &setting, accuracy: 1e-12, ignored: None }.solve(&[orbit], &[]).pop().unwrap().unwrap();
     let p = solved.orbit.free[0];
     assert!((solved.orbit.period - std::f64::consts::PI).abs() < 1e-10, "{}", solved.orbit.period);
     let radius = solved.orbit.nodes.chunks(2).map(|z| z[0].hypot(z[1]));

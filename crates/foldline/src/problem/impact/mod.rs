@@ -37,6 +37,14 @@ use segments::{Nothing, Segments};
 use std::cell::{Cell, RefCell};
 pub(crate) use stored::Flights;
 
+/// Return of perturbations after a period.
+pub(crate) struct Returns {
+    /// `[k][n × n]`: S_i Φ_i of (2).
+    pub transitions: Vec<Vec<f64>>,
+    /// `[n]` f at the beginning of the first flight.
+    pub rate: Vec<f64>,
+}
+
 /// Ratio of the stated to the estimated error of multipliers.
 const SPECTRUM_SAFE: f64 = 4.0;
 
@@ -52,6 +60,10 @@ pub struct ImpactProblem<'a> {
     axes: Vec<Axis>,
     /// `[k]`: sign of the change of the switch of each event.
     signs: Vec<f64>,
+    /// `[k]` durations of the flights of the cycle like which these are.
+    durations: Vec<f64>,
+    /// True if events without speed are left out.
+    besides_grazing: bool,
     /// Phase of the last reference.
     phase: Cell<f64>,
     parked: RefCell<Option<CycleProblem<'static>>>,
@@ -63,6 +75,14 @@ impl<'a> ImpactProblem<'a> {
         let parameters = setting.parameters.clone();
         let flights = Flights::of(setting.field, &parameters, cycle)?;
         Some(ImpactProblem::of(setting, cycle.degree, cycle.forcing_periods, &flights))
+    }
+
+    /// Cycles with the events of `cycle` but those without speed; `None` if it has no others.
+    pub fn besides_grazing(setting: Setting<'a>, cycle: &Cycle) -> Option<ImpactProblem<'a>> {
+        let parameters = setting.parameters.clone();
+        let flights = Flights::between(stored::hard(setting.field, &parameters, cycle), cycle)?;
+        let own = ImpactProblem::of(setting, cycle.degree, cycle.forcing_periods, &flights);
+        Some(ImpactProblem { besides_grazing: true, ..own })
     }
 
     /// Cycles with the events, and on the mesh, of those flights.
@@ -84,8 +104,20 @@ impl<'a> ImpactProblem<'a> {
         let segments = Segments::new(field, flights.events.clone(), forcing_periods);
         let signs = flights.signs(field, &setting.parameters, degree, forcing_periods);
         let phase = Cell::new(flights.phase);
-        let parked = RefCell::new(None);
-        let problem = ImpactProblem { setting, segments, degree, scales, parameters, axes, signs, phase, parked };
+        let durations = flights.flights.iter().map(|(last, _)| *last).collect();
+        let problem = ImpactProblem {
+            setting,
+            segments,
+            degree,
+            scales,
+            parameters,
+            axes,
+            signs,
+            durations,
+            besides_grazing: false,
+            phase,
+            parked: RefCell::new(None),
+        };
         problem.with(|inner| inner.set_mesh(&flights.mesh));
         problem
     }
@@ -209,6 +241,79 @@ impl<'a> ImpactProblem<'a> {
         (0..n * n).map(|k| entry(k / n, k % n)).collect()
     }
 
+    /// Transition of every flight with the saltation at its end; `None` where the matrix is singular.
+    pub(crate) fn returns(&mut self, u: &[f64]) -> Option<Returns> {
+        let (n, all, count, mesh) = (self.n(), self.scales.len(), self.count(), self.mesh());
+        let unknowns = u.len();
+        let rows: Vec<f64> = (0..self.setting.axes.len() * unknowns)
+            .map(|k| 0.6 + (k as f64 * 0.0113).sin() + 0.7 * (k as f64 * 1.37).cos())
+            .collect();
+        let chain = self.with(|inner| {
+            inner.residual(u, &mut vec![0.0; unknowns]).then_some(())?;
+            inner.factorise(u, &rows).ok()?;
+            Some(inner.transitions())
+        })?;
+        let (parameters, block) = (self.parameters_at(u), (self.degree + 1) * all);
+        let mut end = vec![0.0; all];
+        let last = (mesh.len() - 2) * block;
+        Scheme::of(self.degree).value_into(1.0, &u[last..last + block], &mut end);
+        let times = |share: f64, flight: usize| -> Vec<f64> {
+            let before: f64 = (0..flight).map(|j| u[j * (n + 1) + n]).sum();
+            let phase = || u[self.size_on(&mesh) + 1];
+            if self.is_forced() { vec![phase() + before + share * u[flight * (n + 1) + n]] } else { Vec::new() }
+        };
+        let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            (0..n * n).map(|at| (0..n).map(|j| a[at / n * n + j] * b[j * n + at % n]).sum()).collect()
+        };
+        let transition = |i: usize| {
+            let own = i * (n + 1);
+            let mut whole: Vec<f64> = (0..n * n).map(|at| f64::from(u8::from(at % (n + 1) == 0))).collect();
+            for step in chain.chunks_exact(all * all) {
+                let part: Vec<f64> = (0..n * n).map(|at| step[(own + at / n) * all + own + at % n]).collect();
+                whole = product(&part, &whole);
+            }
+            let next = (i + 1) % count * (n + 1);
+            let states = [&end[own..own + n], &u[next..next + n]];
+            product(&self.saltation(&parameters, i, states, &times(1.0, i)), &whole)
+        };
+        let transitions: Vec<Vec<f64>> = (0..count).map(transition).collect();
+        let rate = self.rates(&parameters, &u[..n], &times(0.0, 0));
+        Some(Returns { transitions, rate })
+    }
+
+    /// Flight in which a normalised time of the stored cycle lies, and its share of the duration.
+    pub(crate) fn place(&self, time: f64) -> (usize, f64) {
+        let whole: f64 = self.durations.iter().sum();
+        let mut after = (time * whole - self.phase.get()).rem_euclid(whole);
+        for (flight, last) in self.durations.iter().enumerate() {
+            if after < *last {
+                return (flight, after / last);
+            }
+            after -= last;
+        }
+        (0, 0.0)
+    }
+
+    /// Sign of the change of the switch of an event.
+    pub(crate) fn side(&self, event: usize) -> f64 {
+        self.segments.events.iter().position(|own| *own == event).map_or(1.0, |k| self.signs[k])
+    }
+
+    /// The switch of an event at a share of a flight.
+    pub(crate) fn surface(&self, u: &[f64], flight: usize, share: f64, event: usize) -> f64 {
+        let (n, all, mesh) = (self.n(), self.scales.len(), self.mesh());
+        let block = (self.degree + 1) * all;
+        let j = mesh.partition_point(|node| *node <= share).clamp(1, mesh.len() - 1) - 1;
+        let mut x = vec![0.0; all];
+        let s = (share - mesh[j]) / (mesh[j + 1] - mesh[j]);
+        Scheme::of(self.degree).value_into(s, &u[j * block..(j + 1) * block], &mut x);
+        let last = |i: usize| x[i * (n + 1) + n];
+        let time = u[self.size_on(&mesh) + 1] + (0..flight).map(last).sum::<f64>() + share * last(flight);
+        let times = if self.is_forced() { vec![time] } else { Vec::new() };
+        let own = &x[flight * (n + 1)..flight * (n + 1) + n];
+        stored::surfaces(self.setting.field, &self.parameters_at(u), own, &times)[event]
+    }
+
     /// Multipliers from transitions of the boundary-value problem, `[N][all × all]`.
     fn floquet(&self, u: &[f64], mesh: &Mesh, transitions: &[f64]) -> Floquet {
         let (n, all, count) = (self.n(), self.scales.len(), self.count());
@@ -275,7 +380,10 @@ impl<'a> ImpactProblem<'a> {
         if cycle.degree != self.degree {
             return None;
         }
-        let found = Flights::of(self.setting.field, &point.parameters, cycle)?;
+        let found = match self.besides_grazing {
+            true => Flights::between(stored::hard(self.setting.field, &point.parameters, cycle), cycle)?,
+            false => Flights::of(self.setting.field, &point.parameters, cycle)?,
+        };
         let (q, phase) = (self.segments.forcing_periods, self.phase.get());
         let first = found.beginning(&self.segments.events, phase, q)?;
         Some((found.starting(first, q, phase), first))
@@ -285,11 +393,13 @@ impl<'a> ImpactProblem<'a> {
     fn rotated(&self, v: &[f64], first: usize) -> Vec<f64> {
         let (n, all) = (self.n(), self.scales.len());
         let scalars = 1 + self.axes.len();
-        let Some(size) = v.len().checked_sub(scalars).filter(|size| size % all == 0) else { return v.to_vec() };
-        let mut out = v.to_vec();
-        out[..size].chunks_exact_mut(all).for_each(|row| row.rotate_left(first * (n + 1)));
+        let Some(size) = v.len().checked_sub(scalars) else { return v.to_vec() };
+        // A condition has unknowns before these.
+        let extra = size % all;
+        let (mut out, v, size) = (v.to_vec(), &v[extra..], size - extra);
+        out[extra..extra + size].chunks_exact_mut(all).for_each(|row| row.rotate_left(first * (n + 1)));
         if self.is_forced() {
-            out[size + 1] += (0..first).map(|j| v[j * (n + 1) + n]).sum::<f64>();
+            out[extra + size + 1] += (0..first).map(|j| v[j * (n + 1) + n]).sum::<f64>();
         }
         out
     }

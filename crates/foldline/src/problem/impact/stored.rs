@@ -17,6 +17,8 @@ const ON: [f64; 2] = [1e-8, 1e-6];
 const SAME: f64 = 1e-8;
 /// Distance of nodes that count as one.
 const NODE: f64 = 1e-9;
+/// Distance of an event from the beginning of a period, relative to it, that is rounding.
+const CLOSE: f64 = 1e-12;
 
 /// An event on a cycle.
 #[derive(Clone, Debug)]
@@ -84,6 +86,17 @@ pub fn impacts(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Ve
         }
     }
     found
+}
+
+/// The events of a cycle that move its state: not those of an impact without speed.
+pub(crate) fn hard(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<Impact> {
+    /// Change of the state, relative to the largest, up to which it counts as unchanged.
+    const NONE: f64 = 1e-5;
+    let largest = cycle.profile.iter().fold(f64::MIN_POSITIVE, |most, x| most.max(x.abs()));
+    let change = |own: &Impact| own.after.iter().zip(&own.before).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let mut all = impacts(field, parameters, cycle);
+    all.retain(|own| change(own) > NONE * largest);
+    all
 }
 
 /// The cycle with a mesh node at a time, and the interval that ends there.
@@ -223,7 +236,7 @@ impl Flights {
         let (q, mut time) = (f64::from(forcing_periods), self.phase);
         let mut starts = Vec::with_capacity(self.flights.len());
         for (last, _) in &self.flights {
-            starts.push(time.rem_euclid(q));
+            starts.push((time + CLOSE * q).rem_euclid(q));
             time += last;
         }
         (0..starts.len()).min_by(|a, b| starts[*a].total_cmp(&starts[*b])).unwrap_or(0)
@@ -266,9 +279,10 @@ impl Flights {
             }
             begin += last;
         }
-        // The first multiple of the period from the phase on.
-        let base = whole * (self.phase / whole).ceil();
-        let at = pieces.iter().position(|own| own.ends[0] < base && base < own.ends[1]);
+        // The first multiple of the period from the phase on. An event may lie there, up to rounding.
+        let close = CLOSE * whole;
+        let base = whole * ((self.phase - close) / whole).ceil();
+        let at = pieces.iter().position(|own| own.ends[0] + close < base && base + close < own.ends[1]);
         if let Some(j) = at {
             let [a, b] = pieces[j].ends;
             let s = (base - a) / (b - a);
@@ -277,8 +291,8 @@ impl Flights {
             pieces[j] = Piece { ends: [a, base], nodes: left };
             pieces.insert(j + 1, Piece { ends: [base, b], nodes: right });
         }
-        let first = pieces.iter().position(|own| own.ends[0] >= base).unwrap_or(0);
-        let before = |own: &Piece| (own.ends[0] < base, own.ends[0]);
+        let first = pieces.iter().position(|own| own.ends[0] + close >= base).unwrap_or(0);
+        let before = |own: &Piece| (own.ends[0] + close < base, own.ends[0]);
         pieces.rotate_left(first);
         let mut mesh: Vec<f64> = pieces
             .iter()
