@@ -2,7 +2,7 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Share,
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Recognition, Response, Responses, Search, Share,
     Shortfall, Solution, SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
@@ -124,8 +124,17 @@ fn diagram() -> Diagram {
         settled_after: awkward(5),
         error: awkward(0),
         iterates: Vec::new(),
+        recognition: match motion {
+            Motion::Torus => Recognition {
+                rotation: Some([awkward(1), awkward(2)]),
+                exponent: None,
+                returns: 1000,
+                reason: "none".into(),
+            },
+            _ => Recognition::default(),
+        },
     };
-    let motions = [Motion::Cycle, Motion::Equilibrium, Motion::Other, Motion::Escaped];
+    let motions = Motion::ALL;
     let responses = motions.map(|m| response(m, (m == Motion::Cycle).then_some((2, 1)))).to_vec();
     let sets = [("what attracts", Search::Survey), ("down", Search::Sweep)];
     let sets =

@@ -78,6 +78,12 @@ pub trait VectorField: Send + Sync {
         false
     }
 
+    /// The forced field of which this one is the autonomous form whose last two states go round the unit circle once per
+    /// forcing period; `None` for any other field.
+    fn unclocked(&self) -> Option<&dyn VectorField> {
+        None
+    }
+
     /// True for a map x_{k+1} = f(x_k, p). One iteration is one unit of the field's time and counts as one forcing
     /// period, so that the period of a cycle is prescribed: [`VectorField::forced`] is true, and f depends on no time.
     fn iterated(&self) -> bool {

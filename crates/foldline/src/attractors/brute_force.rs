@@ -109,7 +109,7 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
                 }
                 known.settled_after = known.settled_after.max(response.settled_after);
                 // For a motion without a period, each record covers only part of it.
-                if known.motion == Motion::Other {
+                if matches!(known.motion, Motion::Torus | Motion::Chaos | Motion::Other) {
                     for (a, b) in known.ranges.iter_mut().zip(&response.ranges) {
                         *a = [a[0].min(b[0]), a[1].max(b[1])];
                     }
@@ -133,10 +133,16 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
             (p[0] - q[0]).abs() <= tolerance * size && (p[1] - q[1]).abs() <= tolerance * size
         })
     };
+    let turn = |own: &Response| own.recognition.rotation;
     match (a.period, b.period) {
+        // Each record covers a torus only partly.
+        (Some(p), Some(q)) if a.motion == Motion::Torus => {
+            let same = turn(a).zip(turn(b)).is_some_and(|([x, e], [y, f])| (x - y).abs() <= SAME * SAME + 3.0 * (e + f));
+            (p - q).abs() <= SAME * p && same && close(0.2)
+        }
         (Some(p), Some(q)) => (p - q).abs() <= SAME * p && close(SAME),
         // Records of chaotic motion agree only roughly.
-        (None, None) if a.motion == Motion::Other => close(0.2),
+        (None, None) if a.motion != Motion::Equilibrium => close(0.2),
         (None, None) => close(SAME),
         _ => false,
     }
