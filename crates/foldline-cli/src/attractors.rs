@@ -4,7 +4,7 @@ use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
 use crate::run::processors;
-use crate::values::{parameters, with_motions};
+use crate::values::{parameters, with_one_forcing};
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
 use foldline::contract::VectorField;
 use foldline::diagram::{Response, Shown, Solution};
@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Prints the attractors of a model, each with its number of hits and its basin fraction.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
-    with_motions(&model)?;
+    with_one_forcing(&model)?;
     let parameters = parameters(&typed.set, &model)?;
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());

@@ -100,6 +100,19 @@ pub trait VectorField: Send + Sync {
         vec![0.0; parameters.len()]
     }
 
+    /// Parameter that is the phase, in turns at τ = 0, of a second forcing; `None` if there is none.
+    ///
+    /// With a second forcing f does not have period 1 in τ: it repeats when τ grows by 1 while the phase falls by ρ, the
+    /// [`VectorField::second_turns`], and when the phase alone grows by 1.
+    fn second_phase(&self) -> Option<usize> {
+        None
+    }
+
+    /// ρ, the turns of the second forcing per unit of τ, and its derivatives `[k]` with respect to the parameters.
+    fn second_turns(&self, parameters: &[f64]) -> (f64, Vec<f64>) {
+        (0.0, vec![0.0; parameters.len()])
+    }
+
     /// `[n]` periods of f in each state: finite for an angle, infinite for other states. Empty if no state is an angle.
     ///
     /// States that differ by whole periods are identified, and an orbit closes when it returns to such a copy of its

@@ -45,6 +45,10 @@ pub(super) fn read(
             _ => lasting(walk, table, meant, model, &parameters),
         };
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
+        if model.second_phase().is_some() && source != SeedSource::QuasiPeriodic {
+            let message = "under two forcing frequencies the response is a torus";
+            walk.report(span.clone(), message, "write `attractor = \"torus\"` in this seed");
+        }
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
         seeds.push((span, SeedPlan { name, source, parameters, samples, random: random.unwrap_or(RANDOM) }));

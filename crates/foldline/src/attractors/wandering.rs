@@ -13,7 +13,7 @@ use super::{Limits, Sampling};
 use crate::contract::{VectorField, Verdict};
 use crate::diagram::{Motion, Recognition, Torus};
 use crate::problem::torus::start;
-use crate::simulation::{Clocked, Ensemble, Tolerance};
+use crate::simulation::{Clocked, Ensemble, Outcome, Tolerance};
 
 /// Steps for which each sample settles before it is observed.
 const SETTLING: usize = 100_000;
@@ -37,6 +37,9 @@ pub fn first_torus(
     sampling: &Sampling,
     degree: usize,
 ) -> Result<(Torus, Recognition), String> {
+    if field.second_phase().is_some() {
+        return pulled_back(field, parameters, sampling, degree).map(|torus| (torus, Recognition::default()));
+    }
     let unit = field.time_unit(parameters);
     let driven = Driven(field);
     let (own, sampling): (&dyn VectorField, Sampling) = match field.forced() {
@@ -99,14 +102,37 @@ fn first(
         let scaled = quasi.curve.point(n, k as f64 / count as f64);
         scaled.iter().zip(&quasi.extent).map(|(x, extent)| x * extent).collect()
     };
+    let like = Torus {
+        period: quasi.interval * field.time_unit(parameters),
+        rotation: quasi.curve.turn,
+        forcing_periods: if field.forced() { quasi.turns as u32 } else { 0 },
+        mesh: Default::default(),
+        degree,
+        profile: Vec::new(),
+    };
+    let all: Vec<f64> = (0..count).flat_map(point).collect();
+    integrated(field, &parameters.repeat(count), scales, quasi.interval, (&all, like))
+}
+
+/// The torus of trajectories over a time from the points `[K][n]` of a section, each with its parameters `[K][k]`.
+fn integrated(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    scales: &[f64],
+    interval: f64,
+    (points, like): (&[f64], Torus),
+) -> Option<Torus> {
+    let n = field.dim();
+    let (count, width) = (points.len() / n, field.parameter_count());
     let clocked = Clocked(field);
     let (mut lines, mut most) = (Vec::new(), 0);
     for k in 0..count {
-        let start = [point(k), vec![0.0]].concat();
+        let parameters = &parameters[k * width..(k + 1) * width];
+        let start = [&points[k * n..(k + 1) * n], &[0.0]].concat();
         let absolute = scales[..n].iter().chain([&1.0]).map(|scale| ACCURACY * scale).collect();
         let tolerance = Tolerance { relative: ACCURACY, absolute };
         let mut line: Vec<(f64, Vec<f64>)> = Vec::new();
-        let run = Ensemble::new(&clocked, parameters, tolerance, &start, [0.0, quasi.interval]);
+        let run = Ensemble::new(&clocked, parameters, tolerance, &start, [0.0, interval]);
         let arrival = run
             .run(&mut |step| {
                 for part in 0..4 {
@@ -127,22 +153,79 @@ fn first(
         lines.push(line);
     }
     let intervals = (most / 12).clamp(10, 200);
-    let unit = field.time_unit(parameters);
-    let like = Torus {
-        period: quasi.interval * unit,
-        rotation: quasi.curve.turn,
-        forcing_periods: if field.forced() { quasi.turns as u32 } else { 0 },
-        mesh: Default::default(),
-        degree,
-        profile: Vec::new(),
-    };
     Some(start::of_trajectories(like, n, count, intervals, |k, t, x| {
         // Linear between samples that are much denser than the nodes.
         let line = &lines[k];
-        let time = t * quasi.interval;
+        let time = t * interval;
         let at = line.partition_point(|(own, _)| *own <= time).clamp(1, line.len() - 1);
         let ((a, p), (b, q)) = (&line[at - 1], &line[at]);
         let share = ((time - a) / (b - a).max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
         x.iter_mut().zip(p.iter().zip(q)).for_each(|(x, (p, q))| *x = p + share * (q - p));
     }))
+}
+
+/// The response to two forcings: trajectories that began long before with the same state reach the section at t = 0 with
+/// equally spaced phases of the second forcing.
+fn pulled_back(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    degree: usize,
+) -> Result<Torus, String> {
+    /// Number of phases; continuation changes it.
+    const PHASES: usize = 41;
+    /// Numbers of forcing periods for which the trajectories run.
+    const PERIODS: [f64; 4] = [50.0, 200.0, 800.0, 3200.0];
+    /// Difference, relative to scale and size, at which two numbers of periods lead to the same section.
+    const SAME: f64 = 1e-3;
+    let Some(phase) = field.second_phase() else { return Err("there is no second forcing".into()) };
+    let n = field.dim();
+    let own = |k: usize| {
+        let mut own = parameters.to_vec();
+        own[phase] += k as f64 / PHASES as f64;
+        own
+    };
+    let all: Vec<f64> = (0..PHASES).flat_map(own).collect();
+    let clocked = Clocked(field);
+    let starts = sampling.starts();
+    let mut why = String::from("no sample was taken");
+    for start in starts.chunks_exact(n).take(BLOCK) {
+        let mut before: Option<Vec<f64>> = None;
+        for periods in PERIODS {
+            let begin: Vec<f64> = [start, &[-periods]].concat().repeat(PHASES);
+            let absolute = sampling.scales.iter().chain([&1.0]).map(|scale| 1e-8 * scale).collect();
+            let tolerance = Tolerance { relative: 1e-8, absolute };
+            let run = Ensemble::with_own_parameters(&clocked, &all, tolerance, &begin, [0.0, periods]);
+            let arrivals = run.with_step_limit(1_000_000).run(&mut |_| Verdict::Continue);
+            if field.ended() {
+                return Err("the run is to end".into());
+            }
+            if arrivals.iter().any(|own| own.outcome != Outcome::Reached) {
+                why = "a trajectory escaped or took more than a million steps".into();
+                break;
+            }
+            let section: Vec<f64> = arrivals.iter().flat_map(|own| own.state[..n].to_vec()).collect();
+            let apart = |old: &Vec<f64>| {
+                let each = old.iter().zip(&section).enumerate();
+                each.map(|(k, (a, b))| (a - b).abs() / (sampling.scales[k % n] + b.abs())).fold(0.0, f64::max)
+            };
+            if before.as_ref().is_some_and(|old| apart(old) <= SAME) {
+                let like = Torus {
+                    period: field.time_unit(parameters),
+                    rotation: field.second_turns(parameters).0,
+                    forcing_periods: 1,
+                    mesh: Default::default(),
+                    degree,
+                    profile: Vec::new(),
+                };
+                return integrated(field, &all, &sampling.scales, 1.0, (&section, like))
+                    .ok_or("the trajectories of its section could not be integrated".into());
+            }
+            before = Some(section);
+        }
+        if before.is_some() {
+            why = "the trajectories had not settled after 3200 periods of the first forcing".into();
+        }
+    }
+    Err(format!("no torus was reached: {why}"))
 }

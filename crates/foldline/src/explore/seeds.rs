@@ -158,6 +158,9 @@ impl<'p> Seeds<'p> {
             return given.map(|(_, point)| with_degree(point.clone(), plan.degree)).ok_or("not needed".into());
         }
         system.repeats(&seed.parameters, &[])?;
+        if system.field.second_phase().is_some() && seed.source != SeedSource::QuasiPeriodic {
+            return Err("under two forcing frequencies the response is a torus; ask for `attractor = \"torus\"`".into());
+        }
         let point = match &seed.source {
             SeedSource::Cycle(cycle) if system.is_open() => from_arc(system, seed, plan.tolerance, cycle)?,
             SeedSource::Cycle(cycle) => {

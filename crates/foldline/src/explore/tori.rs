@@ -135,6 +135,14 @@ pub(super) fn met(system: &System, plan: &Plan, seed: &SeedPlan) -> Result<(Poin
     }
     let sampling = sampling(system, seed.samples, seed.random, 1, plan.tolerance);
     let (torus, known) = first_torus(system.field, &seed.parameters, &sampling, plan.degree)?;
+    if system.field.second_phase().is_some() {
+        let said = format!(
+            "response to both forcings: {:.9} turns of the second per period of the first; torus of {} trajectories",
+            torus.rotation,
+            torus.phases()
+        );
+        return Ok((bare(&seed.parameters, Solution::Torus(torus)), said));
+    }
     let [rotation, error] = known.rotation.unwrap_or([f64::NAN; 2]);
     let said = format!(
         "quasi-periodic motion: rotation number {rotation:.9} ± {error:.0e} over {} periods; torus of {} trajectories",
