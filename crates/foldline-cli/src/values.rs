@@ -88,7 +88,8 @@ pub fn with_one_forcing(model: &Model) -> Result<(), Failure> {
     if model.second_phase().is_none() {
         return Ok(());
     }
-    let message = format!("the model `{}` has two forcing frequencies, for which this command is not supported", model.name);
+    let message =
+        format!("the model `{}` has two forcing frequencies, for which this command is not supported", model.name);
     let cure = "follow its tori with `foldline run` and a study: `attractor = \"torus\"` under [[seed]], and [[branch]]; \
                 or integrate it with `foldline simulate`";
     Err(Failure::typed(message, cure))

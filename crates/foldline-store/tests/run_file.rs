@@ -2,8 +2,8 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Recognition, Response, Responses, Search, Share,
-    Shortfall, Solution, SpecialPoint, Trust,
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Recognition, Response, Responses,
+    Search, Share, Shortfall, Solution, SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};

@@ -28,7 +28,8 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     columns.extend(["hits", "share", "share_low", "share_high"].map(|name| column(name, Style::Number)));
     columns.push(Column::in_unit("settled_after", Style::Size, &model.time));
     columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
-    columns.extend(["rotation", "rotation_error", "exponent", "exponent_error"].map(|name| column(name, Style::Varying)));
+    columns
+        .extend(["rotation", "rotation_error", "exponent", "exponent_error"].map(|name| column(name, Style::Varying)));
     columns.push(column("undecided", Style::Word));
     let row = |set: &Responses, response: &Response, jump: &str| {
         let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into())];

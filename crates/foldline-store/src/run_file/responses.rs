@@ -30,7 +30,8 @@ const FIRST: [&str; 15] = [
     "rowid",
 ];
 /// Columns added later: integers, the bytes of iterates, or NULL.
-const LATER: [&str; 6] = ["uniform_hits", "uniform_starts", "jumped", "iterate_bytes", "recognition_bytes", "undecided"];
+const LATER: [&str; 6] =
+    ["uniform_hits", "uniform_starts", "jumped", "iterate_bytes", "recognition_bytes", "undecided"];
 const LAST: [&str; 7] = [
     "parameter_bytes",
     "state_bytes",

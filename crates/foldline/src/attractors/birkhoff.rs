@@ -101,27 +101,39 @@ impl<'a> Samples<'a> {
 
     /// The curve (3) with at most `most` harmonics of a line, fewer if the samples lie on it to `enough`.
     pub(super) fn curve(&self, turn: f64, most: usize, enough: f64) -> Curve {
+        /// Sweeps over the harmonics: each removes from one what its neighbours had left in it.
+        const SWEEPS: usize = 6;
         let (n, weights) = (self.n, weights(self.count()));
         let mut rest = self.values.to_vec();
-        let mut coefficients = Vec::new();
-        let mut residual = f64::INFINITY;
-        for k in 0..=most {
-            let waves: Vec<Complex64> =
-                (0..self.count()).map(|j| Complex64::cis(TAU * (k as f64 * turn * j as f64).fract())).collect();
-            let mut own = vec![Complex64::default(); n];
-            for ((x, wave), w) in rest.chunks_exact(n).zip(&waves).zip(&weights) {
-                own.iter_mut().zip(x).for_each(|(sum, x)| *sum += w * x * wave.conj());
-            }
-            let twice = if k == 0 { 1.0 } else { 2.0 };
-            residual = 0.0;
-            for (x, wave) in rest.chunks_exact_mut(n).zip(&waves) {
-                for (x, c) in x.iter_mut().zip(&own) {
-                    *x -= twice * (c * wave).re;
-                    residual = x.abs().max(residual);
+        let mut coefficients: Vec<Complex64> = Vec::new();
+        let (mut residual, mut count) = (f64::INFINITY, most + 1);
+        for sweep in 0..SWEEPS {
+            let before = residual;
+            for k in 0..count {
+                let waves: Vec<Complex64> =
+                    (0..self.count()).map(|j| Complex64::cis(TAU * (k as f64 * turn * j as f64).fract())).collect();
+                let mut own = vec![Complex64::default(); n];
+                for ((x, wave), w) in rest.chunks_exact(n).zip(&waves).zip(&weights) {
+                    own.iter_mut().zip(x).for_each(|(sum, x)| *sum += w * x * wave.conj());
+                }
+                let twice = if k == 0 { 1.0 } else { 2.0 };
+                residual = 0.0;
+                for (x, wave) in rest.chunks_exact_mut(n).zip(&waves) {
+                    for (x, c) in x.iter_mut().zip(&own) {
+                        *x -= twice * (c * wave).re;
+                        residual = x.abs().max(residual);
+                    }
+                }
+                match sweep {
+                    0 => coefficients.extend(own),
+                    _ => coefficients[k * n..(k + 1) * n].iter_mut().zip(own).for_each(|(sum, c)| *sum += c),
+                }
+                if residual <= enough {
+                    break;
                 }
             }
-            coefficients.extend(own);
-            if residual <= enough {
+            count = coefficients.len() / n.max(1);
+            if residual <= enough || residual > 0.5 * before {
                 break;
             }
         }

@@ -193,12 +193,13 @@ impl Iteration<'_> {
     /// Recognises a motion that was not seen to repeat itself.
     fn recognised(&self, response: &mut Response) {
         if self.field.periods().iter().any(|period| period.is_finite()) {
-            response.recognition.reason = "quasi-periodic motion and chaos of maps with angles are not told apart".into();
+            response.recognition.reason =
+                "quasi-periodic motion and chaos of maps with angles are not told apart".into();
             return;
         }
         let limits = Limits { steps: self.limit, ..Limits::patient() };
         let trial = Trial { field: self.field, scales: self.scales, whirl: None, jobs: 1, limits };
-        let found = recognise(&trial, self.parameters, &response.state);
+        let found = recognise(&trial, self.parameters, &response.state, false);
         (response.recognition, response.state) = (found.evidence, found.state);
         response.motion = match &found.nature {
             Nature::Cycle(_) => Motion::Cycle,

@@ -5,7 +5,7 @@
 //! sampled uniformly in time; extrema are those of quartics through five samples.
 
 use super::Candidate;
-use super::recognition::{Nature, recognise};
+use super::recognition::{Found, Nature, recognise};
 use super::settling::{Settled, Trial};
 use super::spectrum::lines;
 use crate::contract::{Batch, Parameters, Verdict};
@@ -60,18 +60,16 @@ pub(super) fn response(
 
 /// Recognises a motion that is neither at rest nor was seen to repeat.
 fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
-    let found = recognise(trial, parameters, &settled.state);
+    let found = match &settled.found {
+        Some(found) => Found::clone(found),
+        None => recognise(trial, parameters, &settled.state, false),
+    };
     (response.recognition, response.state) = (found.evidence, found.state);
     match found.nature {
         Nature::Cycle(period) => {
             response.motion = Motion::Cycle;
-            let settled = Settled {
-                motion: Motion::Cycle,
-                state: response.state.clone(),
-                period,
-                error: 0.0,
-                ..settled.clone()
-            };
+            let settled =
+                Settled { motion: Motion::Cycle, state: response.state.clone(), period, error: 0.0, ..settled.clone() };
             return cycle(trial, parameters, &settled, response);
         }
         Nature::Torus(quasi) => {

@@ -60,8 +60,8 @@ pub use sampling::Sampling;
 pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
 pub(crate) use spectrum::ratio_of_samples;
-pub use wandering::first_torus;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
+pub use wandering::first_torus;
 
 use crate::contract::VectorField;
 use crate::diagram::{Point, Share};

@@ -25,7 +25,8 @@
 //! **Departures.** ρ is the frequency of the line whose harmonics describe all states, so that no angle around a centre
 //! has to be chosen. It is determined up to its sign and whole numbers, and is given between 0 and 1/2.
 //!
-//! **Fails when** more than two frequencies are present, or a locked motion has more than N/8 intervals per period.
+//! **Fails when** more than two frequencies are present, a locked motion has more than N/8 intervals per period, or a
+//! cycle attracts by less than 1e-4 over a record. Transient chaos that lasts longer than the record counts as chaos.
 
 use super::birkhoff::{Curve, Samples, average};
 use super::settling::Trial;
@@ -97,8 +98,9 @@ struct Record {
     steps: usize,
 }
 
-/// Observes a trajectory of the trial from a state on.
-pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64]) -> Found {
+/// Observes a trajectory of the trial from a state on; each record takes at most the steps of the limit. `brief` keeps to the
+/// shortest records.
+pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64], brief: bool) -> Found {
     let undecided = |reason: &str| Found {
         nature: Nature::Undecided,
         evidence: Recognition { reason: reason.into(), ..Recognition::default() },
@@ -112,15 +114,16 @@ pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64]) -> Fou
     let Some((mut state, interval)) = watch.begun(state, own.is_some(), limits.steps) else {
         return undecided("the limit on steps or time was reached before an interval was found for its observation");
     };
-    let (mut count, mut steps) = (RECORDS[0], 0);
+    let mut count = RECORDS[0];
+    let most = if brief { 2 * RECORDS[0] } else { RECORDS[1] };
     let mut last = None;
-    while count <= RECORDS[1] && (count as f64) * interval <= limits.time && !field.ended() {
-        let Some(record) = watch.record(&state, interval, count, limits.steps.saturating_sub(steps)) else { break };
+    while count <= most && (count as f64) * interval <= limits.time && !field.ended() {
+        let Some(record) = watch.record(&state, interval, count, limits.steps) else { break };
         if record.states.len() < count * n {
-            let found = Found { nature: Nature::Lost, evidence: Recognition::default(), state: back(&state, own.is_some()) };
-            return if record.steps + steps >= limits.steps { last.unwrap_or(undecided(LIMIT)) } else { found };
+            let found =
+                Found { nature: Nature::Lost, evidence: Recognition::default(), state: back(&state, own.is_some()) };
+            return if record.steps >= limits.steps { last.unwrap_or(undecided(LIMIT)) } else { found };
         }
-        steps += record.steps;
         state = record.states[(count - 1) * n..].to_vec();
         let (nature, evidence) = watch.judged(&record, interval);
         let decided = !matches!(nature, Nature::Undecided);
@@ -264,7 +267,9 @@ impl Watch<'_> {
             let parameters = Parameters::Shared(self.parameters);
             let at = Batch { lanes: 1, states: &x, parameters, times: &[], signs: &[] };
             self.field.linearise(at, &[], &mut next, &mut fx, &mut []);
-            let row = |i: usize| -> f64 { (0..n).map(|j| fx[i * n + j] * v[j] * self.scales[j]).sum::<f64>() / self.scales[i] };
+            let row = |i: usize| -> f64 {
+                (0..n).map(|j| fx[i * n + j] * v[j] * self.scales[j]).sum::<f64>() / self.scales[i]
+            };
             let moved: Vec<f64> = (0..n).map(row).collect();
             let norm = moved.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
             v = moved.iter().map(|v| v / norm).collect();
@@ -288,11 +293,8 @@ impl Watch<'_> {
         let count = samples.count();
         let growth = exponent(&record.growth);
         let unit = interval * self.field.time_unit(self.parameters);
-        let mut evidence = Recognition {
-            exponent: growth.map(|own| own.map(|e| e / unit)),
-            returns: count,
-            ..Recognition::default()
-        };
+        let mut evidence =
+            Recognition { exponent: growth.map(|own| own.map(|e| e / unit)), returns: count, ..Recognition::default() };
         let shrinks = growth.is_none_or(|[rate, error]| rate + error < 0.0);
         if let Some(q) = closing(&samples) {
             if shrinks {
@@ -338,14 +340,19 @@ impl Watch<'_> {
                     None => "; its largest exponent is not known, as f or the state jumps".to_string(),
                     Some(_) => String::new(),
                 };
-                format!("its states lie on no closed curve to better than {:.0e} of its extent{exponent}", curve.residual)
+                format!(
+                    "its states lie on no closed curve to better than {:.0e} of its extent{exponent}",
+                    curve.residual
+                )
             }
             _ if error > KNOWN => format!("its rotation number is known to {error:.0e} only"),
             _ if near.is_some() => {
                 let (p, q) = near.unwrap_or_default();
                 format!("its rotation number cannot be told from {p}/{q}, at which it may lock to a cycle")
             }
-            _ if change > STEADY => format!("it still changes, by {change:.0e} of its amplitude over half of the record"),
+            _ if change > STEADY => {
+                format!("it still changes, by {change:.0e} of its amplitude over half of the record")
+            }
             _ if !idle => "its largest exponent is not 0 as on a torus".into(),
             () => String::new(),
         };

@@ -46,7 +46,8 @@ pub fn first_torus(
         true => (&driven, with_clock(sampling, unit)),
         false => (field, sampling.clone()),
     };
-    let scales = if field.forced() { with_unit_scales(&sampling.scales[..field.dim()]) } else { sampling.scales.clone() };
+    let scales =
+        if field.forced() { with_unit_scales(&sampling.scales[..field.dim()]) } else { sampling.scales.clone() };
     let limits = Limits { steps: SETTLING, ..Limits::patient() };
     let trial = Trial { field: own, scales: &scales, whirl: None, jobs: 1, limits };
     let watched = Trial { limits: Limits::patient(), ..trial };
@@ -63,7 +64,7 @@ pub fn first_torus(
                 Motion::Equilibrium | Motion::Cycle => settled += 1,
                 Motion::Escaped => escaped += 1,
                 _ => {
-                    let found = recognise(&watched, parameters, &motion.state);
+                    let found = recognise(&watched, parameters, &motion.state, false);
                     match found.nature {
                         Nature::Torus(quasi) => {
                             return first(field, parameters, &scales, &quasi, degree)
@@ -88,13 +89,7 @@ pub fn first_torus(
 }
 
 /// The torus of trajectories from equally spaced points of a section.
-fn first(
-    field: &dyn VectorField,
-    parameters: &[f64],
-    scales: &[f64],
-    quasi: &Quasi,
-    degree: usize,
-) -> Option<Torus> {
+fn first(field: &dyn VectorField, parameters: &[f64], scales: &[f64], quasi: &Quasi, degree: usize) -> Option<Torus> {
     let n = field.dim();
     let harmonics = quasi.curve.coefficients.chunks_exact(n).rposition(|own| own.iter().any(|c| c.norm() > SMALL));
     let count = 2 * harmonics.unwrap_or(0).clamp(10, 100) + 1;

@@ -236,7 +236,11 @@ impl Quantity {
         let ends: Vec<String> = ends.collect();
         let ended = channels.flat_map(|name| ENDINGS.map(|(ending, _)| format!("{name}{ending}")));
         let parameters = model.parameters.iter().map(|p| p.name.clone());
-        parameters.chain(["period".into(), "frequency".into(), "rotation".into(), "norm".into()]).chain(ended).chain(ends).collect()
+        parameters
+            .chain(["period".into(), "frequency".into(), "rotation".into(), "norm".into()])
+            .chain(ended)
+            .chain(ends)
+            .collect()
     }
 }
 

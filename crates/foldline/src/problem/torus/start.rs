@@ -58,7 +58,13 @@ fn laid(like: Torus, n: usize, count: usize, time: &Mesh, at: impl Fn(usize, usi
 }
 
 /// The torus whose trajectories have the states `at(k, t)` at the normalised time t, on a uniform mesh.
-pub fn of_trajectories(like: Torus, n: usize, count: usize, intervals: usize, at: impl Fn(usize, f64, &mut [f64])) -> Torus {
+pub fn of_trajectories(
+    like: Torus,
+    n: usize,
+    count: usize,
+    intervals: usize,
+    at: impl Fn(usize, f64, &mut [f64]),
+) -> Torus {
     let (scheme, time, m) = (Scheme::of(like.degree), mesh::uniform(intervals), like.degree);
     laid(like, n, count, &time, |k, node, x| {
         let (j, i) = (node / (m + 1), node % (m + 1));
