@@ -36,6 +36,8 @@ pub(super) struct Curve {
     pub(super) coefficients: Vec<Complex64>,
     /// Largest distance of a sample from the curve.
     pub(super) residual: f64,
+    /// Change of f that reduces the distances most, in least squares.
+    correction: f64,
 }
 
 /// The weights (1).
@@ -137,11 +139,54 @@ impl<'a> Samples<'a> {
                 break;
             }
         }
-        Curve { turn, coefficients, residual }
+        let correction = self.correction(&rest, &weights, turn, &coefficients);
+        Curve { turn, coefficients, residual, correction }
+    }
+
+    /// Change of f that reduces the remainders most: their projection on the change of the curve with f, which grows with the
+    /// distance from the middle of the record.
+    fn correction(&self, rest: &[f64], weights: &[f64], turn: f64, coefficients: &[Complex64]) -> f64 {
+        let (n, middle) = (self.n, (self.count() as f64 - 1.0) / 2.0);
+        let mut sums = [0.0; 2];
+        let curve = Curve { turn, coefficients: coefficients.to_vec(), residual: 0.0, correction: 0.0 };
+        for (j, (x, w)) in rest.chunks_exact(n).zip(weights).enumerate() {
+            let place = j as f64 - middle;
+            let slope = curve.slope(n, (turn * j as f64).fract());
+            for (x, slope) in x.iter().zip(slope) {
+                sums[0] += w * place * slope * x;
+                sums[1] += w * place * place * slope * slope;
+            }
+        }
+        if sums[1] > 0.0 { sums[0] / sums[1] } else { 0.0 }
+    }
+
+    /// A curve with its frequency corrected by least squares.
+    pub(super) fn sharpened(&self, curve: &Curve, enough: f64) -> Curve {
+        const ROUNDS: usize = 3;
+        let most = curve.coefficients.len() / self.n - 1;
+        let mut best = self.curve(curve.turn, most, enough);
+        for _ in 0..ROUNDS {
+            let next = self.curve(best.turn + best.correction, most, enough);
+            if next.residual >= best.residual {
+                break;
+            }
+            best = next;
+        }
+        best
     }
 }
 
 impl Curve {
+    /// Derivative `[n]` with respect to the phase in turns.
+    fn slope(&self, n: usize, phase: f64) -> Vec<f64> {
+        let mut x = vec![0.0; n];
+        for (k, own) in self.coefficients.chunks_exact(n).enumerate().skip(1) {
+            let wave = Complex64::cis(TAU * (k as f64 * phase).fract()) * Complex64::new(0.0, 2.0 * TAU * k as f64);
+            x.iter_mut().zip(own).for_each(|(x, c)| *x += (c * wave).re);
+        }
+        x
+    }
+
     /// Point `[n]` at a phase in turns.
     pub(super) fn point(&self, n: usize, phase: f64) -> Vec<f64> {
         let mut x = vec![0.0; n];

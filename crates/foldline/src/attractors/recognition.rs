@@ -50,6 +50,9 @@ const ENOUGH: f64 = 1e-9;
 const KNOWN: f64 = 1e-6;
 /// Largest change of the amplitude, of (3).
 const STEADY: f64 = 1e-4;
+/// Error of a line from which the frequency is corrected by the whole curve, and distance from the curve up to which.
+const SHARP: f64 = 1e-9;
+const ROUGH: f64 = 0.1;
 /// Number of harmonics of the curve.
 const HARMONICS: usize = 100;
 /// Largest number of intervals after which a torus may close, as after its doubling.
@@ -316,6 +319,9 @@ impl Watch<'_> {
                 if best.as_ref().is_none_or(|(_, known)| curve.residual < 0.5 * known.residual) {
                     best = Some((turns, curve));
                 }
+                if best.as_ref().is_some_and(|(_, curve)| curve.residual <= NEAR) {
+                    break;
+                }
             }
             if best.as_ref().is_some_and(|(_, curve)| curve.residual <= NEAR) {
                 break;
@@ -327,7 +333,13 @@ impl Watch<'_> {
         };
         let thinned: Vec<f64> = scaled.chunks_exact(n).step_by(turns).flatten().copied().collect();
         let own = Samples { values: &thinned, n };
-        let halves = own.halves().map(|half| half.line_near(curve.turn));
+        let mut curve = curve;
+        let mut halves = own.halves().map(|half| half.line_near(curve.turn));
+        if (halves[0] - halves[1]).abs() > SHARP && curve.residual <= ROUGH {
+            // Lines close to others are biased; all harmonics together are not.
+            curve = own.sharpened(&curve, ENOUGH);
+            halves = own.halves().map(|half| half.sharpened(&curve, ENOUGH).turn);
+        }
         let error = (halves[0] - halves[1]).abs().max(1e-14);
         evidence.rotation = Some([curve.turn, error]);
         let [a, b] = [0, 1].map(|k| own.halves()[k].curve(halves[k], 1, 0.0).amplitude(n));

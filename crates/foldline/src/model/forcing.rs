@@ -59,7 +59,10 @@ pub fn unrepeated(
                     "{own} does not have the forcing period {unit}: it is {a:.6} at t = {time:.6} and {b:.6} one \
                      period later, in the same state"
                 );
-                return Some([message, "give a frequency or period common to everything that depends on `t`".into()]);
+                let hint = "give a frequency or period common to everything that depends on `t`; if two frequencies have \
+                            none, the response is quasi-periodic: write `frequencies = [\"Omega\", \"nu\"]` under \
+                            [forcing], and `t1` and `t2` for the time in the terms of each";
+                return Some([message, hint.into()]);
             }
         }
     }
