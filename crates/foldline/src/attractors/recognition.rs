@@ -18,7 +18,8 @@
 //! ```
 //!
 //! A motion that locks to p/q has ρ = p/q exactly, and so fails (3) whatever else it does. λ is a weighted average over
-//! eight parts of the record, and ε three times the standard error of their mean.
+//! eight parts of the record, and ε three times the standard error of their mean. δ is at least ten times the accuracy of the
+//! integration.
 //!
 //! **Source.** das2017 (weighted averages), laskar1999 (frequencies), benettin1980 (exponents).
 //!
@@ -334,16 +335,16 @@ impl Watch<'_> {
         let thinned: Vec<f64> = scaled.chunks_exact(n).step_by(turns).flatten().copied().collect();
         let own = Samples { values: &thinned, n };
         let mut curve = curve;
-        let mut halves = own.halves().map(|half| half.line_near(curve.turn));
-        if (halves[0] - halves[1]).abs() > SHARP && curve.residual <= ROUGH {
+        let mut halves = own.halves().map(|half| half.curve(half.line_near(curve.turn), 1, 0.0));
+        if (halves[0].turn - halves[1].turn).abs() > SHARP && curve.residual <= ROUGH {
             // Lines close to others are biased; all harmonics together are not.
             curve = own.sharpened(&curve, ENOUGH);
-            halves = own.halves().map(|half| half.sharpened(&curve, ENOUGH).turn);
+            halves = own.halves().map(|half| half.sharpened(&curve, ENOUGH));
         }
-        let error = (halves[0] - halves[1]).abs().max(1e-14);
+        let rounding = if self.field.iterated() { 1e-14 } else { 10.0 * ACCURACY };
+        let error = (halves[0].turn - halves[1].turn).abs().max(rounding);
         evidence.rotation = Some([curve.turn, error]);
-        let [a, b] = [0, 1].map(|k| own.halves()[k].curve(halves[k], 1, 0.0).amplitude(n));
-        let change = (a / b).ln().abs();
+        let change = (halves[0].amplitude(n) / halves[1].amplitude(n)).ln().abs();
         let idle = growth.is_none_or(|[rate, error]| rate.abs() <= 3.0 * error || rate.abs() * count as f64 <= 0.5);
         let near = ratio_near(curve.turn, 10.0 * error, own.count() / 8);
         evidence.reason = match () {

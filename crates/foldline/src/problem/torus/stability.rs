@@ -34,8 +34,6 @@ use std::f64::consts::TAU;
 const SAFE: f64 = 4.0;
 /// Rounding of a mean frequency of one half.
 const HALF: f64 = 1e-6;
-/// Defect of the sum of the logarithms of the multipliers beyond which they are not given.
-const UNRESOLVED: f64 = 0.1;
 /// Error of a multiplier by rounding.
 const ROUNDING: f64 = 1e-11;
 
@@ -65,10 +63,6 @@ impl TorusProblem<'_> {
             spectrum: f64::NAN,
             ..Trust::default()
         };
-        // The sum of the exponents is known; multipliers that do not have it belong to perturbations that are not resolved.
-        if trust.liouville_defect > UNRESOLVED {
-            return Examination { trust, ..unknown() };
-        }
         let unstable = found[trivial..].iter().filter(|z| z.norm() > 1.0).count();
         let trivial = trivial + given;
         found.splice(0..0, vec![Complex64::new(1.0, 0.0); given]);
