@@ -84,7 +84,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// What is known of a motion that did not settle.
+/// Prints the evidence for the type of a motion that did not settle.
 fn told(out: &mut impl Write, other: &Response) -> std::io::Result<()> {
     let known = &other.recognition;
     let kind = other.motion.name();

@@ -190,7 +190,7 @@ impl Iteration<'_> {
         rest
     }
 
-    /// Recognises a motion that was not seen to repeat itself.
+    /// Recognises a motion that did not repeat itself.
     fn recognised(&self, response: &mut Response) {
         if self.field.periods().iter().any(|period| period.is_finite()) {
             response.recognition.reason =

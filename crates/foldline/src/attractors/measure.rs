@@ -58,7 +58,7 @@ pub(super) fn response(
     (response, candidate)
 }
 
-/// Recognises a motion that is neither at rest nor was seen to repeat.
+/// Recognises a motion that neither rests nor repeated itself.
 fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
     let found = match &settled.found {
         Some(found) => Found::clone(found),

@@ -1,6 +1,6 @@
 //! Quasi-periodic motion, locked cycles and chaos told apart by one trajectory.
 //!
-//! **Idea.** A trajectory that neither comes to rest nor is seen to repeat is observed at equal intervals: the forcing
+//! **Idea.** A trajectory that neither comes to rest nor repeats itself is observed at equal intervals: the forcing
 //! period or, without forcing, the period of its strongest spectral line. From N such states follow the rotation number
 //! with its error, the closed curve on which they lie, and the largest Lyapunov exponent with its error. If these do not
 //! decide, the trajectory goes on for twice as many intervals.
@@ -85,7 +85,7 @@ pub(super) struct Quasi {
     pub(super) extent: Vec<f64>,
 }
 
-/// What the record of a trajectory shows.
+/// Type of the motion of a trajectory, with the evidence.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     pub(super) nature: Nature,

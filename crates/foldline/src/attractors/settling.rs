@@ -69,7 +69,7 @@ pub(super) struct Settled {
     pub(super) extent: Vec<f64>,
     pub(super) time: f64,
     pub(super) error: f64,
-    /// What recognition found, if it has decided.
+    /// Result of recognition, if it has decided.
     pub(super) found: Option<Box<Found>>,
 }
 

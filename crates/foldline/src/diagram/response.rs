@@ -42,7 +42,7 @@ impl Motion {
     }
 }
 
-/// Numbers by which a motion that is neither at rest nor seen to repeat was recognised, or the reason why it was not.
+/// Numbers by which a motion that neither rests nor repeats itself was recognised, or the reason why it was not.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recognition {
     /// Rotation number ρ of a torus, in turns per period, with its error; up to its sign and whole numbers, and between 0

@@ -69,7 +69,7 @@ pub fn unrepeated(
     None
 }
 
-/// Likewise for a field with a second forcing.
+/// [`unrepeated`] for a field with a second forcing.
 fn unrepeated_twice(
     field: &dyn VectorField,
     names: &[String],
