@@ -103,7 +103,7 @@ struct Record {
 }
 
 /// Observes a trajectory of the trial from a state on; each record takes at most the steps of the limit. `brief` keeps to the
-/// shortest records.
+/// shortest record.
 pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64], brief: bool) -> Found {
     let undecided = |reason: &str| Found {
         nature: Nature::Undecided,
@@ -119,7 +119,7 @@ pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64], brief:
         return undecided("the limit on steps or time was reached before an interval was found for its observation");
     };
     let mut count = RECORDS[0];
-    let most = if brief { 2 * RECORDS[0] } else { RECORDS[1] };
+    let most = RECORDS[usize::from(!brief)];
     let mut last = None;
     while count <= most && (count as f64) * interval <= limits.time && !field.ended() {
         let Some(record) = watch.record(&state, interval, count, limits.steps) else { break };
