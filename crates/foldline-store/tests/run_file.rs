@@ -626,7 +626,7 @@ fn responses_can_be_read_by_name_and_files_without_them_are_read_too() {
             Ok((r.get::<_, i64>(0)?, r.get::<_, f64>(1)?, r.get::<_, f64>(2)?, r.get::<_, i64>(3)?))
         })
         .unwrap();
-    assert_eq!(row, (4, 1.0 / 3.0, 1.0 / 3.0, 2));
+    assert_eq!(row, (6, 1.0 / 3.0, 1.0 / 3.0, 2));
     // As written by earlier versions: without the later columns, then without the tables.
     let later = ["uniform_hits", "uniform_starts", "jumped"];
     later
