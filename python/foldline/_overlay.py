@@ -31,7 +31,7 @@ _ARROWS = {"up": (">", 3.5, "→"), "down": ("<", 6.0, "←")}
 #: Maximum number of legs of sweeps labelled beside their curves; more are named in the legend only.
 _ROOM = 2
 #: Marks of the motions of a survey.
-_MOTIONS = {"equilibrium": "s", "cycle": "o", "other": "_"}
+_MOTIONS = {"equilibrium": "s", "cycle": "o", "torus": "d", "chaos": "x", "other": "_"}
 
 
 def listed(seen: Seen) -> list[Responses]:
@@ -248,7 +248,7 @@ def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any
 def _spread(axes: Any, own: Responses, x: str, y: str, colour: Any) -> list[Any]:
     """Draws the range of every motion that does not repeat, as a bar from its smallest to its largest value."""
     name = y.removesuffix("_max").removesuffix("_min")
-    chosen = own.motion == "other"
+    chosen = np.isin(own.motion, ["torus", "chaos", "other"])
     if not chosen.any() or f"{name}_min" not in own.columns:
         return []
     low, high = own[f"{name}_min"][chosen], own[f"{name}_max"][chosen]

@@ -80,7 +80,7 @@ def _simulated(graph_objects: Any, given: Sequence[Responses], x: str | None, y:
 
 #: Marks that point in the direction of a sweep, filled upwards and hollow downwards.
 _ARROWS = {"up": ("triangle-right", 6, "→"), "down": ("triangle-left-open", 10, "←")}
-_MOTIONS = {"equilibrium": "square-open", "cycle": "circle-open", "other": "line-ew-open"}
+_MOTIONS = {"equilibrium": "square-open", "cycle": "circle-open", "torus": "diamond-open", "chaos": "x-thin-open", "other": "line-ew-open"}
 
 
 def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, joined: bool = False) -> list[Any]:

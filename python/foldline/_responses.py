@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ._diagram import Diagram
     from ._model import Model
 
-_NUMBERS = ("value", "period", "share", "share_low", "share_high", "settled_after", "error")
+_NUMBERS = ("value", "period", "share", "share_low", "share_high", "settled_after", "error", "rotation", "rotation_error", "exponent", "exponent_error")
 
 
 class Responses(Mapping[str, Any]):
@@ -56,7 +56,8 @@ class Responses(Mapping[str, Any]):
     def motion(self) -> np.ndarray[Any, Any]:
         """Type of each motion, shape (responses,).
 
-        ``"equilibrium"``, ``"cycle"``, ``"other"`` (neither at rest nor periodic within the limit on the number of steps) or ``"escaped"``.
+        ``"equilibrium"``, ``"cycle"``, ``"torus"``, ``"chaos"``, ``"other"`` (undecided; the column ``"undecided"`` says why) or ``"escaped"``.
+        Columns ``"rotation"``, ``"exponent"`` and their errors hold the evidence for a torus or chaos.
         """
         own: np.ndarray[Any, Any] = self._table["motion"]
         return own
@@ -255,7 +256,7 @@ def _table(own: Mapping[str, Any], model: Model) -> dict[str, Any]:
     table: dict[str, Any] = {name: parameters[:, k] for k, name in enumerate(model.parameters)}
     for k, name in enumerate(variables):
         table[f"{name}_min"], table[f"{name}_max"] = ranges[:, k, 0], ranges[:, k, 1]
-    words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits")}
+    words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits", "undecided")}
     words["jumped"] = np.array(own["jumped"], dtype=object)
     ratios = ["" if pair is None else f"{pair[0]}:{pair[1]}" for pair in own["ratio"]]
     return {**numbers, **words, "ratio": np.array(ratios), **table}

@@ -4,12 +4,12 @@ use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
 use crate::run::processors;
-use crate::values::{parameters, with_motions};
+use crate::values::{parameters, with_one_forcing};
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
 use foldline::contract::VectorField;
-use foldline::diagram::{Shown, Solution};
+use foldline::diagram::{Response, Shown, Solution};
 use foldline::explore::System;
-use foldline::explore::attractors;
+use foldline::explore::{attractors, unsettled_motions};
 use foldline::model::Model;
 use foldline_store::finite::never_finite;
 use foldline_store::model_file::read_model;
@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Prints the attractors of a model, each with its number of hits and its basin fraction.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
-    with_motions(&model)?;
+    with_one_forcing(&model)?;
     let parameters = parameters(&typed.set, &model)?;
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());
@@ -34,6 +34,13 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         processors(),
         TOLERANCE,
     );
+    let others = unsettled_motions(
+        &System::of(&model, &parameters),
+        &parameters,
+        (typed.samples as usize, typed.seed),
+        &census,
+        TOLERANCE,
+    );
     drop(working);
 
     let mut out = stdout().lock();
@@ -42,6 +49,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     writeln!(out, "{:<14} {:>6} {:>6} {:>20} {:>14}{heads}", "attractor", "ratio", "hits", "share", "period")?;
     for attractor in &census.attractors {
         writeln!(out, "{}", line(attractor, &model))?;
+    }
+    for other in &others {
+        writeln!(out, "{}", line_of_unsettled(other, &model))?;
     }
     let samples = typed.samples;
     let mut stuck = if census.stuck > 0 {
@@ -57,6 +67,13 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         exits => format!(", {} left the region where the vector field is defined", exits.len()),
     };
     writeln!(out, "{samples} samples: {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
+    let examined: usize = others.iter().map(|other| other.hits).sum();
+    if examined > 0 {
+        writeln!(out, "{examined} of those not settled were followed further; the lines without a share show them")?;
+    }
+    for other in &others {
+        told(&mut out, other)?;
+    }
     let uniform = (0..samples as usize).filter(|number| Sampling::is_uniform(*number)).count();
     writeln!(
         out,
@@ -65,6 +82,30 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         samples as usize - uniform
     )?;
     Ok(Outcome::Done)
+}
+
+/// Prints the evidence for the type of a motion that did not settle.
+fn told(out: &mut impl Write, other: &Response) -> std::io::Result<()> {
+    let known = &other.recognition;
+    let kind = other.motion.name();
+    if let Some([rotation, error]) = known.rotation {
+        writeln!(out, "{kind}: rotation number {rotation:.9} ± {error:.0e} per period")?;
+    }
+    if let Some([exponent, error]) = known.exponent {
+        writeln!(out, "{kind}: largest exponent {exponent:.3e} ± {error:.0e}, over {} periods", known.returns)?;
+    }
+    match known.reason.is_empty() {
+        true => Ok(()),
+        false => writeln!(out, "{kind}: undecided, because {}", known.reason),
+    }
+}
+
+fn line_of_unsettled(other: &Response, model: &Model) -> String {
+    let period = other.period.map_or("·".to_string(), |period| format!("{:.9}", Shown(period)));
+    let n = model.states.len() + model.outputs.len();
+    let range = |r: &[f64; 2]| format!("  {:>24}", format!("{:.6} … {:.6}", Shown(r[0]), Shown(r[1])));
+    let ranges: String = other.ranges.iter().take(n).map(range).collect();
+    format!("{:<14} {:>6} {:>6} {:>20} {period:>14}{ranges}", other.motion.name(), "·", other.hits, "·")
 }
 
 fn line(attractor: &Attractor, model: &Model) -> String {

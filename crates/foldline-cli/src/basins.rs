@@ -6,7 +6,7 @@ use crate::plot::picture;
 use crate::progress::SignOfLife;
 use crate::run::processors;
 use crate::table::{Cell, Column, Style, Table, write};
-use crate::values::{measured, parameters, states, with_motions};
+use crate::values::{measured, parameters, states, with_one_forcing};
 use foldline::attractors::Fate;
 use foldline::contract::VectorField;
 use foldline::diagram::{Share, Solution};
@@ -25,7 +25,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Computes the basins; prints a table, and writes a picture and the cells.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
-    with_motions(&model)?;
+    with_one_forcing(&model)?;
     let parameters = parameters(&typed.set, &model)?;
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());

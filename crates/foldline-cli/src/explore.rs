@@ -5,7 +5,7 @@
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::{Way, carried_out, limited, processors};
-use crate::values::{measured, parameter, valued, with_motions};
+use crate::values::{measured, parameter, valued, with_one_forcing};
 use foldline::diagram::Shown;
 use foldline::model::Model;
 use foldline_store::model_file::read_model;
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Runs the exploration, or prints it as a study.
 pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, model_text) = read_model(&typed.model)?;
-    with_motions(&model)?;
+    with_one_forcing(&model)?;
     let text = study(typed, &model)?;
     let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
     let study = limited(study, &typed.limits)?;

@@ -79,6 +79,22 @@ pub fn parameter(name: &str, model: &Model) -> Result<usize, (String, String)> {
     model.parameter_index(name).ok_or_else(unknown)
 }
 
+/// Refuses a boundary-value problem, and a model with two forcing frequencies.
+///
+/// # Errors
+/// The message for such a model.
+pub fn with_one_forcing(model: &Model) -> Result<(), Failure> {
+    with_motions(model)?;
+    if model.second_phase().is_none() {
+        return Ok(());
+    }
+    let message =
+        format!("the model `{}` has two forcing frequencies, for which this command is not supported", model.name);
+    let cure = "follow its tori with `foldline run` and a study: `attractor = \"torus\"` under [[seed]], and [[branch]]; \
+                or integrate it with `foldline simulate`";
+    Err(Failure::typed(message, cure))
+}
+
 /// Refuses a boundary-value problem where motions from initial states are asked for.
 ///
 /// # Errors

@@ -52,7 +52,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
         match response.motion {
             Motion::Escaped => seen.escaped += response.hits,
             Motion::Equilibrium | Motion::Cycle => seen.settled += response.hits,
-            Motion::Other => {}
+            Motion::Torus | Motion::Chaos | Motion::Other => {}
         }
     }
     for name in ["from given", "from sampled"] {

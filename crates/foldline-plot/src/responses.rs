@@ -121,6 +121,7 @@ mod tests {
             settled_after: 0.0,
             error: 0.0,
             iterates: Vec::new(),
+            recognition: Default::default(),
         };
         let responses = values.iter().enumerate().map(one).collect();
         Responses { name: "s".into(), search: Search::Sweep, free: 0, responses }

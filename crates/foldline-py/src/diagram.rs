@@ -307,6 +307,14 @@ fn responses<'py>(py: Python<'py>, set: &diagram::Responses, variables: usize) -
     parts.set_item("period", number(|r| r.period.unwrap_or(f64::NAN))?)?;
     parts.set_item("settled_after", number(|r| r.settled_after)?)?;
     parts.set_item("error", number(|r| r.error)?)?;
+    let pair = |of: fn(&diagram::Recognition) -> Option<[f64; 2]>, k: usize| {
+        numbers(py, all.iter().map(move |r| of(&r.recognition).map_or(f64::NAN, |pair| pair[k])))
+    };
+    parts.set_item("rotation", pair(|r| r.rotation, 0)?)?;
+    parts.set_item("rotation_error", pair(|r| r.rotation, 1)?)?;
+    parts.set_item("exponent", pair(|r| r.exponent, 0)?)?;
+    parts.set_item("exponent_error", pair(|r| r.exponent, 1)?)?;
+    parts.set_item("undecided", all.iter().map(|r| r.recognition.reason.clone()).collect::<Vec<_>>())?;
     parts.set_item("motion", all.iter().map(|r| r.motion.name()).collect::<Vec<_>>())?;
     parts.set_item("ratio", all.iter().map(|r| r.ratio).collect::<Vec<_>>())?;
     parts.set_item("multiplicity", all.iter().map(|r| r.multiplicity).collect::<Vec<_>>())?;

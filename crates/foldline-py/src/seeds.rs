@@ -27,6 +27,7 @@ pub fn settle(
 ) -> PyResult<Solution> {
     let parameters = checked(py, model, parameters)?;
     let source = match attractor {
+        Some("torus") => SeedSource::QuasiPeriodic,
         Some(name) => SeedSource::Attractor(key(py, model, name)?),
         None => SeedSource::State(read(state)),
     };
@@ -120,7 +121,7 @@ fn key(py: Python, model: &Model, name: &str) -> PyResult<AttractorKey> {
         },
         _ => said(
             format!("\"{name}\" is not an attractor"),
-            "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
+            "\"equilibrium\", \"cycle\", \"torus\", or a ratio of whole numbers such as \"2:1\"",
         ),
     }
 }

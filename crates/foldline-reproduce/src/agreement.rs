@@ -349,6 +349,8 @@ pub fn described(motion: &Response) -> String {
         (Motion::Cycle, Some((p, q)), 1) => format!("{p}:{q}"),
         (Motion::Cycle, Some((p, q)), turns) => format!("{p}:{q} closing after {turns} turns"),
         (Motion::Cycle, None, _) => "a cycle".into(),
+        (Motion::Torus, ..) => "quasi-periodic motion".into(),
+        (Motion::Chaos, ..) => "chaos".into(),
         (Motion::Other, ..) => "neither at rest nor periodic".into(),
         (other, ..) => other.name().into(),
     }

@@ -39,7 +39,9 @@ pub(crate) fn check_seeds(
                 let state = &cycle.profile[..cycle.dim()];
                 not_finite(model, state, &seed.parameters).map(|c| (c, state.to_vec()))
             }
-            SeedSource::Attractor(_) | SeedSource::Torus(_) => failing_everywhere(model, &seed.parameters),
+            SeedSource::Attractor(_) | SeedSource::Torus(_) | SeedSource::QuasiPeriodic => {
+                failing_everywhere(model, &seed.parameters)
+            }
         };
         let Some((component, state)) = failing else { continue };
         let message = complaint(model, component, &state, &seed.parameters);

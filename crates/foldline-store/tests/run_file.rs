@@ -2,8 +2,8 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Share,
-    Shortfall, Solution, SpecialPoint, Trust,
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Recognition, Response, Responses,
+    Search, Share, Shortfall, Solution, SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};
@@ -124,8 +124,17 @@ fn diagram() -> Diagram {
         settled_after: awkward(5),
         error: awkward(0),
         iterates: Vec::new(),
+        recognition: match motion {
+            Motion::Torus => Recognition {
+                rotation: Some([awkward(1), awkward(2)]),
+                exponent: None,
+                returns: 1000,
+                reason: "none".into(),
+            },
+            _ => Recognition::default(),
+        },
     };
-    let motions = [Motion::Cycle, Motion::Equilibrium, Motion::Other, Motion::Escaped];
+    let motions = Motion::ALL;
     let responses = motions.map(|m| response(m, (m == Motion::Cycle).then_some((2, 1)))).to_vec();
     let sets = [("what attracts", Search::Survey), ("down", Search::Sweep)];
     let sets =
@@ -617,7 +626,7 @@ fn responses_can_be_read_by_name_and_files_without_them_are_read_too() {
             Ok((r.get::<_, i64>(0)?, r.get::<_, f64>(1)?, r.get::<_, f64>(2)?, r.get::<_, i64>(3)?))
         })
         .unwrap();
-    assert_eq!(row, (4, 1.0 / 3.0, 1.0 / 3.0, 2));
+    assert_eq!(row, (6, 1.0 / 3.0, 1.0 / 3.0, 2));
     // As written by earlier versions: without the later columns, then without the tables.
     let later = ["uniform_hits", "uniform_starts", "jumped"];
     later

@@ -140,7 +140,7 @@ export class Diagram {
 
   draw(surface, x, y, theme) {
     for (const { x: a, y: b, motion } of this.responses()) {
-      const style = motion === "other" ? { fill: theme.faint, alpha: 0.6 } : { stroke: theme.soft, width: 1, alpha: 0.8 };
+      const style = ["torus", "chaos", "other"].includes(motion) ? { fill: theme.faint, alpha: 0.6 } : { stroke: theme.soft, width: 1, alpha: 0.8 };
       const [px, py] = [x.pixelOfEven(a), y.pixelOfEven(b)];
       surface.shape((path) => path.arc(px, py, 1.8, 0, 2 * Math.PI), style);
     }

@@ -78,6 +78,12 @@ pub trait VectorField: Send + Sync {
         false
     }
 
+    /// The forced field of which this one is the autonomous form whose last two states go round the unit circle once per
+    /// forcing period; `None` for any other field.
+    fn unclocked(&self) -> Option<&dyn VectorField> {
+        None
+    }
+
     /// True for a map x_{k+1} = f(x_k, p). One iteration is one unit of the field's time and counts as one forcing
     /// period, so that the period of a cycle is prescribed: [`VectorField::forced`] is true, and f depends on no time.
     fn iterated(&self) -> bool {
@@ -92,6 +98,19 @@ pub trait VectorField: Send + Sync {
     /// Derivatives `[k]` of [`VectorField::time_unit`] with respect to the parameters.
     fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
         vec![0.0; parameters.len()]
+    }
+
+    /// Parameter that is the phase, in turns at τ = 0, of a second forcing; `None` if there is none.
+    ///
+    /// With a second forcing f does not have period 1 in τ: it repeats when τ grows by 1 while the phase falls by ρ, the
+    /// [`VectorField::second_turns`], and when the phase alone grows by 1.
+    fn second_phase(&self) -> Option<usize> {
+        None
+    }
+
+    /// ρ, the turns of the second forcing per unit of τ, and its derivatives `[k]` with respect to the parameters.
+    fn second_turns(&self, parameters: &[f64]) -> (f64, Vec<f64>) {
+        (0.0, vec![0.0; parameters.len()])
     }
 
     /// `[n]` periods of f in each state: finite for an angle, infinite for other states. Empty if no state is an angle.

@@ -9,7 +9,8 @@ const SHOWN: usize = 4;
 
 /// Table with one row per response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of
 /// outputs and states, hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until
-/// settled, error, and whether a sweep jumped there.
+/// settled, error, whether a sweep jumped there, rotation number and largest exponent with their errors, and why the
+/// type of the motion was not decided.
 pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search"]);
     columns.extend(model.parameters.iter().map(|p| Column::in_unit(&p.name, Style::Varying, &p.unit)));
@@ -27,6 +28,9 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     columns.extend(["hits", "share", "share_low", "share_high"].map(|name| column(name, Style::Number)));
     columns.push(Column::in_unit("settled_after", Style::Size, &model.time));
     columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
+    columns
+        .extend(["rotation", "rotation_error", "exponent", "exponent_error"].map(|name| column(name, Style::Varying)));
+    columns.push(column("undecided", Style::Word));
     let row = |set: &Responses, response: &Response, jump: &str| {
         let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into())];
         let parameter = |k: usize| response.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v));
@@ -46,6 +50,12 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
         row.push(Cell::Number(response.settled_after));
         row.push(if response.error.is_nan() { Cell::Empty } else { Cell::Number(response.error) });
         row.push(Cell::Word(jump.into()));
+        let known = &response.recognition;
+        row.extend([known.rotation, known.exponent].into_iter().flat_map(|pair| match pair {
+            Some(pair) => pair.map(Cell::Number),
+            None => [Cell::Empty, Cell::Empty],
+        }));
+        row.push(Cell::Word(known.reason.clone()));
         row
     };
     let rows = diagram.responses.iter().flat_map(|set| {

@@ -92,6 +92,10 @@ pub(super) fn response_cells(response: &Response, model: &Model) -> Vec<Cell> {
         Cell::Real(response.settled_after),
         Cell::Real(response.error),
     ];
+    let known = &response.recognition;
+    for pair in [known.rotation, known.exponent] {
+        out.extend(pair.map_or([Cell::Empty, Cell::Empty], |pair| pair.map(Cell::Real)));
+    }
     out.extend(padded(&response.parameters, model.parameters.len()));
     out.extend(padded(response.ranges.as_flattened(), 2 * (n + outputs)));
     out.extend(padded(&response.state, n));

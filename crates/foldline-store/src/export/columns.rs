@@ -224,7 +224,7 @@ impl Variables {
     /// Columns of a response found by simulation.
     pub(super) fn of_response(&self) -> Vec<Column> {
         let mut out = vec![
-            text("motion", "equilibrium, cycle, other or escaped"),
+            text("motion", "equilibrium, cycle, torus, chaos, other or escaped"),
             real("value", "value of the free parameter"),
             real("period", "period of a cycle"),
             integer("ratio_first", "first number of the spectral ratio of a cycle, 0 if there is none"),
@@ -239,6 +239,10 @@ impl Variables {
             integer("jumped", "1 if the sweep left the solution of the previous value, 0 if not, -1 if unknown"),
             real("settled_after", "settling time"),
             real("error", "deviation of the motion from periodicity, relative to its extent"),
+            real("rotation", "rotation number of a torus, turns per period"),
+            real("rotation_error", "error of the rotation number"),
+            real("exponent", "largest Lyapunov exponent other than that along the motion"),
+            real("exponent_error", "error of the exponent"),
         ];
         out.extend_from_slice(&self.parameters);
         out.extend_from_slice(&self.ranges);

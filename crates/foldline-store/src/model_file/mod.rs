@@ -16,7 +16,7 @@ mod units;
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, diagnose, read_text, unreadable};
-use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, unsupported};
+use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Parameter, unsupported};
 use foldline_shaft::Machine;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
@@ -192,7 +192,7 @@ impl Reader<'_> {
         for (name, place, value) in self.entries(root, "parameters") {
             self.parameter(name, place, value, &mut source);
         }
-        source.forcing = root.get("forcing").and_then(|value| self.forcing(value));
+        source.forcing = root.get("forcing").and_then(|value| self.forcing(value, &mut source));
         if let Some((boundary, length)) = self.boundary(root) {
             (source.boundary, source.forcing) = (Some(boundary), length);
         }
@@ -270,8 +270,12 @@ impl Reader<'_> {
     }
 
     /// Reads the forcing: exactly one of `frequency` and `period`.
-    fn forcing(&mut self, value: &Value) -> Option<Forcing> {
+    fn forcing(&mut self, value: &Value, source: &mut ModelSource) -> Option<Forcing> {
         let several = |value: &Value| value.get_ref().as_array().is_some();
+        let two = value.get_ref().as_table().and_then(|t| t.get("frequencies")).filter(|own| several(own));
+        if let Some(own) = two {
+            return self.two_forcings(value, own, source);
+        }
         let listed = several(value) || value.get_ref().as_table().is_some_and(|t| t.values().any(several));
         if let Some(kind) = unsupported("frequencies").filter(|_| listed) {
             self.forcing_misspelt = true;
@@ -299,6 +303,40 @@ impl Reader<'_> {
         let what = if is_frequency { "the frequency of the forcing" } else { "the period of the forcing" };
         let expression = self.expression(Item::Forcing, own.span(), own, what);
         Some(Forcing { is_frequency, expression })
+    }
+
+    /// Reads two frequencies. The times `t1` and `t2` of their terms become definitions, and the phase of the second a
+    /// parameter.
+    fn two_forcings(&mut self, value: &Value, own: &Value, source: &mut ModelSource) -> Option<Forcing> {
+        const PHASE: &str = "phase_2";
+        let before = self.walk.found.len();
+        if let Some(table) = self.walk.table(value, "`forcing`") {
+            self.walk.only(table, &["frequencies"], "a forcing with two frequencies");
+        }
+        self.places.insert((Item::Forcing, Field::Name), value.span());
+        let list: Vec<&Value> = own.get_ref().as_array().map(|list| list.iter().collect()).unwrap_or_default();
+        let [first, second] = list[..] else {
+            let message = format!("`frequencies` lists {} of them", list.len());
+            self.walk.report(own.span(), message, "give two, as in `frequencies = [\"Omega\", \"nu\"]`");
+            self.forcing_misspelt = true;
+            return Some(Forcing { is_frequency: false, expression: "1".into() });
+        };
+        let what = "a frequency of the forcing";
+        let second = self.expression(Item::Forcing, second.span(), second, what);
+        let expression = self.expression(Item::Forcing, first.span(), first, what);
+        self.forcing_misspelt = self.walk.found.len() > before;
+        let mut phase = Parameter::new(PHASE, 0.0);
+        phase.description = "phase of the second forcing at t = 0, in turns".into();
+        self.places.insert((Item::Parameter(source.parameters.len()), Field::Name), own.span());
+        source.parameters.push(phase);
+        for (name, text) in [("t1", "t".to_string()), ("t2", format!("t + {PHASE}*2*pi/({second})"))] {
+            let item = Item::Definition(source.definitions.len());
+            self.places.insert((item, Field::Name), own.span());
+            self.places.insert((item, Field::Expression), own.span());
+            source.definitions.push(Definition::new(name, &text));
+        }
+        source.second = Some((Forcing { is_frequency: true, expression: second }, PHASE.into()));
+        Some(Forcing { is_frequency: true, expression })
     }
 
     /// Reads the text of an expression. Any other type is reported and replaced by `0`, so that it is reported only

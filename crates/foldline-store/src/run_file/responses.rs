@@ -6,7 +6,7 @@
 use super::RunFileError;
 use super::bytes::{pack, pack_pairs, unpack, unpack_pairs};
 use super::schema::{Columns, quoted};
-use foldline::diagram::{Motion, Response, Responses, Search, Share};
+use foldline::diagram::{Motion, Recognition, Response, Responses, Search, Share};
 use foldline::model::Model;
 use rusqlite::types::Value;
 use rusqlite::{Connection, Row, params, params_from_iter};
@@ -30,8 +30,17 @@ const FIRST: [&str; 15] = [
     "rowid",
 ];
 /// Columns added later: integers, the bytes of iterates, or NULL.
-const LATER: [&str; 4] = ["uniform_hits", "uniform_starts", "jumped", "iterate_bytes"];
-const LAST: [&str; 5] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes", "iterate_bytes"];
+const LATER: [&str; 6] =
+    ["uniform_hits", "uniform_starts", "jumped", "iterate_bytes", "recognition_bytes", "undecided"];
+const LAST: [&str; 7] = [
+    "parameter_bytes",
+    "state_bytes",
+    "range_bytes",
+    "scalar_bytes",
+    "iterate_bytes",
+    "recognition_bytes",
+    "undecided",
+];
 
 fn columns(model: &Model) -> Columns {
     Columns::beside(model, &FIRST.into_iter().chain(LAST).collect::<Vec<_>>())
@@ -59,7 +68,8 @@ fn tables(model: &Model) -> String {
              uniform_hits INTEGER, uniform_starts INTEGER, jumped INTEGER,
              {shown}
              parameter_bytes BLOB NOT NULL, state_bytes BLOB NOT NULL, range_bytes BLOB NOT NULL,
-             scalar_bytes BLOB NOT NULL, iterate_bytes BLOB, PRIMARY KEY (response_set, number));"
+             scalar_bytes BLOB NOT NULL, iterate_bytes BLOB, recognition_bytes BLOB, undecided TEXT,
+             PRIMARY KEY (response_set, number));"
     )
 }
 
@@ -122,7 +132,39 @@ fn values_of(response: &Response, shown: usize) -> Vec<Value> {
         Value::Blob(pack(&scalars)),
         if response.iterates.is_empty() { Value::Null } else { Value::Blob(pack(&response.iterates)) },
     ]);
+    values.extend(recognition_values(&response.recognition));
     values
+}
+
+/// ρ and λ, each with its error and NaN if it is missing, and the number of periods; then the reason.
+fn recognition_values(own: &Recognition) -> [Value; 2] {
+    if *own == Recognition::default() {
+        return [Value::Null, Value::Null];
+    }
+    let [rotation, exponent] = [own.rotation, own.exponent].map(|pair| pair.unwrap_or([f64::NAN; 2]));
+    let numbers = [&rotation[..], &exponent, &[own.returns as f64]].concat();
+    [Value::Blob(pack(&numbers)), Value::Text(own.reason.clone())]
+}
+
+/// Inverse of [`recognition_values`]; empty in files of earlier versions.
+fn recognition_in(row: &Row) -> Result<Recognition, String> {
+    let bytes = match row.get::<_, Option<Vec<u8>>>("recognition_bytes") {
+        Err(rusqlite::Error::InvalidColumnName(_)) => None,
+        other => other.map_err(|e| e.to_string())?,
+    };
+    let Some(bytes) = bytes else { return Ok(Recognition::default()) };
+    let numbers = unpack(&bytes).ok_or("recognition_bytes has a length that is not a multiple of 8")?;
+    let [rotation, doubt, exponent, error, returns] = numbers[..] else {
+        return Err("recognition_bytes does not have five numbers".to_string());
+    };
+    let pair = |value: f64, error: f64| (!value.is_nan()).then_some([value, error]);
+    let reason = row.get::<_, Option<String>>("undecided").map_err(|e| e.to_string())?.unwrap_or_default();
+    Ok(Recognition {
+        rotation: pair(rotation, doubt),
+        exponent: pair(exponent, error),
+        returns: returns as usize,
+        reason,
+    })
 }
 
 /// Loads all sets in the order in which they were completed.
@@ -202,5 +244,6 @@ fn response_in(row: &Row) -> Result<Response, String> {
                 unpack(&bytes).ok_or("iterate_bytes has a length that is not a multiple of 8")?
             }
         },
+        recognition: recognition_in(row)?,
     })
 }

@@ -223,6 +223,15 @@ pub(super) fn fits(walk: &mut Walk, item: &Item, held: &Held, start: &Start, fam
         }
         let periodic = matches!(level.quantity, Quantity::Period | Quantity::Frequency | Quantity::Integral(_))
             || level.quantity.terms().any(|term| term.order().is_some());
+        let turns = level.quantity == Quantity::Rotation;
+        if turns && family.is_some_and(|family| family != Family::Torus) {
+            let right = "a branch of tori as the start, or another quantity";
+            walk.report(at(), "only tori have a rotation number", right);
+        }
+        if !turns && family == Some(Family::Torus) {
+            let right = "`hold = \"rotation\"`";
+            walk.report(at(), format!("`{name}` cannot be held along tori"), right);
+        }
         if family == Some(Family::Equilibrium) && periodic {
             walk.report(at(), format!("equilibria have no `{name}`"), "a state or output, or a branch of cycles");
         }

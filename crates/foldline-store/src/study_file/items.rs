@@ -101,7 +101,7 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
         SeedSource::Attractor(AttractorKey::Equilibrium) => Some(Family::Equilibrium),
         SeedSource::Attractor(AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_))
         | SeedSource::Cycle(_) => Some(Family::Cycle),
-        SeedSource::Torus(_) => Some(Family::Torus),
+        SeedSource::Torus(_) | SeedSource::QuasiPeriodic => Some(Family::Torus),
         SeedSource::State(_) => None,
     };
     Known { name: seed.name.clone(), start: Start::Seed(index), beginning: at.clone(), end: Some(at), family }

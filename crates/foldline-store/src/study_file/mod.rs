@@ -293,9 +293,22 @@ fn parse(
     })
 }
 
+/// Reports what is not supported with two forcing frequencies.
+fn one_forcing(walk: &mut Walk, root: &DeTable) {
+    designs::refuse(walk, root, "models with two forcing frequencies");
+    for key in ["explore", "survey", "sweep", "curve", "homotopy"] {
+        let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
+        let message = format!("`{key}` is not supported for models with two forcing frequencies");
+        walk.report(span, message, "follow the tori with `[[seed]]`, `attractor = \"torus\"`, and `[[branch]]`");
+    }
+}
+
 /// Reports what does not exist for a boundary-value problem: whatever needs motions from initial states, or curves in
 /// two parameters, which are not followed yet.
 fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
+    if model.second_phase().is_some() {
+        return one_forcing(walk, root);
+    }
     if model.conditions() == [0, 0] {
         return;
     }

@@ -45,6 +45,10 @@ pub(super) fn read(
             _ => lasting(walk, table, meant, model, &parameters),
         };
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
+        if model.second_phase().is_some() && source != SeedSource::QuasiPeriodic {
+            let message = "under two forcing frequencies the response is a torus";
+            walk.report(span.clone(), message, "write `attractor = \"torus\"` in this seed");
+        }
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
         seeds.push((span, SeedPlan { name, source, parameters, samples, random: random.unwrap_or(RANDOM) }));
@@ -66,6 +70,7 @@ fn source(
     }
     let fallback = SeedSource::Attractor(AttractorKey::Equilibrium);
     let found = match (table.get("attractor"), table.get("state"), table.get("cycle")) {
+        (Some(value), None, None) if value.get_ref().as_str() == Some("torus") => quasi_periodic(walk, value, model),
         (Some(value), None, None) => attractor(walk, value, model).map(SeedSource::Attractor),
         (None, Some(value), None) => state(walk, value, model).map(SeedSource::State),
         (None, None, Some(value)) => cycle(walk, value, model, degree).map(SeedSource::Cycle),
@@ -94,9 +99,23 @@ fn source(
     found.unwrap_or(fallback)
 }
 
+/// A torus met by simulation.
+fn quasi_periodic(walk: &mut Walk, value: &Value, model: &Model) -> Option<SeedSource> {
+    let angles = model.states.iter().any(|state| state.period.is_some());
+    let message = match () {
+        _ if model.iterated() => "tori of maps, which are closed curves, are not supported",
+        _ if model.switch_count() > 0 => "tori of models whose right-hand side switches are not supported",
+        _ if angles => "tori of models with angles are not supported",
+        () => return Some(SeedSource::QuasiPeriodic),
+    };
+    walk.report(value.span(), message, "use `attractor = \"cycle\"`; surveys and sweeps show such motions");
+    None
+}
+
 /// The torus that the cycle of a source is, while the forcing does not act.
 fn of_torus(walk: &mut Walk, value: &Value, source: SeedSource, model: &Model) -> SeedSource {
     let message = match (&source, model) {
+        (SeedSource::QuasiPeriodic, _) => "`attractor = \"torus\"` is a torus already",
         _ if model.iterated() => "tori of maps are not supported",
         _ if model.conditions() != [0, 0] => "a boundary-value problem has no tori",
         _ if !model.forced() => "`torus` belongs to models with a forcing, which begins to act on a cycle",
@@ -214,7 +233,7 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
             Some(AttractorKey::Ratio(a, b))
         }
         _ => {
-            let hint = "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"";
+            let hint = "\"equilibrium\", \"cycle\", \"torus\", or a ratio of whole numbers such as \"2:1\"";
             let (message, hint) = match unsupported(&text) {
                 Some(kind) => (format!("the attractor \"{text}\": {}", kind.message), kind.instead),
                 None => (format!("\"{text}\" is not an attractor"), hint),

@@ -111,6 +111,7 @@ pub fn record(folder: &Path) {
         settled_after: awkward(5),
         error: awkward(0),
         iterates: Vec::new(),
+        recognition: Default::default(),
     };
     let set = Responses { name: "down".into(), search: Search::Sweep, free: 2, responses: vec![response] };
     recorder.observe(Event::Responses(&set));

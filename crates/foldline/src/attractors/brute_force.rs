@@ -6,7 +6,7 @@
 
 use super::angles::{self, Rolled};
 use super::measure::response;
-use super::settling::{First, Settled, Trial, settle_together};
+use super::settling::{First, Settled, Trial, settle_or_recognise};
 use super::{Candidate, Sampling, driven, iterated};
 use crate::contract::Verdict;
 use crate::diagram::{Motion, Response, Share};
@@ -74,9 +74,7 @@ pub fn survey_by_simulation(
             let settled: Vec<Settled> = starts
                 .chunks((BLOCK * n).max(1))
                 .take_while(|_| !trial.field.ended())
-                .flat_map(|block| {
-                    settle_together(trial, &own.repeat(block.len() / n), block, First::Rough, trial.limits_at(&own))
-                })
+                .flat_map(|block| settle_or_recognise(trial, &own, block, First::Rough))
                 .collect();
             let counted = |(number, settled): (usize, &Settled)| Response {
                 share: share(number),
@@ -109,7 +107,7 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
                 }
                 known.settled_after = known.settled_after.max(response.settled_after);
                 // For a motion without a period, each record covers only part of it.
-                if known.motion == Motion::Other {
+                if matches!(known.motion, Motion::Torus | Motion::Chaos | Motion::Other) {
                     for (a, b) in known.ranges.iter_mut().zip(&response.ranges) {
                         *a = [a[0].min(b[0]), a[1].max(b[1])];
                     }
@@ -133,10 +131,17 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
             (p[0] - q[0]).abs() <= tolerance * size && (p[1] - q[1]).abs() <= tolerance * size
         })
     };
+    let turn = |own: &Response| own.recognition.rotation;
     match (a.period, b.period) {
+        // Each record covers a torus only partly.
+        (Some(p), Some(q)) if a.motion == Motion::Torus => {
+            let same =
+                turn(a).zip(turn(b)).is_some_and(|([x, e], [y, f])| (x - y).abs() <= SAME * SAME + 3.0 * (e + f));
+            (p - q).abs() <= SAME * p && same && close(0.2)
+        }
         (Some(p), Some(q)) => (p - q).abs() <= SAME * p && close(SAME),
         // Records of chaotic motion agree only roughly.
-        (None, None) if a.motion == Motion::Other => close(0.2),
+        (None, None) if a.motion != Motion::Equilibrium => close(0.2),
         (None, None) => close(SAME),
         _ => false,
     }
@@ -173,9 +178,7 @@ pub fn stepped_sweep(
     let (mut own, mut state) = (parameters.to_vec(), start.to_vec());
     for &value in values {
         own[free] = value;
-        let Some(settled) = settle_together(trial, &own, &state, First::Accurate, trial.limits_at(&own)).pop() else {
-            break;
-        };
+        let Some(settled) = settle_or_recognise(trial, &own, &state, First::Accurate).pop() else { break };
         let (mut response, candidate) = response(trial, &own, free, &settled);
         response.jumped = compare(&own, candidate.as_ref());
         state.clone_from(&response.state);

@@ -333,7 +333,8 @@ fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Poin
         Motion::Cycle => context.turn(&settled.state, settled.period),
         Motion::Escaped if settled.state.iter().all(|x| x.abs() < Response::UNBOUNDED) => return Err(Lost::Stuck),
         Motion::Escaped => return Err(Lost::Escaped),
-        Motion::Other => {
+        // Settling names no other types.
+        Motion::Other | Motion::Torus | Motion::Chaos => {
             let Settled { time, extent, state, .. } = settled;
             return Err(Lost::Unsettled { time, extent, state });
         }

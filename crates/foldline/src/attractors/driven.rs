@@ -54,6 +54,10 @@ impl Driven<'_> {
 }
 
 impl VectorField for Driven<'_> {
+    fn unclocked(&self) -> Option<&dyn VectorField> {
+        Some(self.0)
+    }
+
     fn dim(&self) -> usize {
         self.n() + 2
     }

@@ -9,8 +9,9 @@
 
 use super::brute_force::{Compare, Report};
 use super::census::Lost;
+use super::recognition::{Nature, recognise};
 use super::settling::Trial;
-use super::{Attractor, Candidate, Census, Enough, Exit, Fate, Polish, Sampling};
+use super::{Attractor, Candidate, Census, Enough, Exit, Fate, Limits, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Motion, Point, Response, Share, Solution};
 use crate::problem::map::transposed;
@@ -187,6 +188,31 @@ impl Iteration<'_> {
             self.rolled(&mut rest, kept.len());
         }
         rest
+    }
+
+    /// Recognises a motion that did not repeat itself.
+    fn recognised(&self, response: &mut Response) {
+        if self.field.periods().iter().any(|period| period.is_finite()) {
+            response.recognition.reason =
+                "quasi-periodic motion and chaos of maps with angles are not told apart".into();
+            return;
+        }
+        let limits = Limits { steps: self.limit, ..Limits::patient() };
+        let trial = Trial { field: self.field, scales: self.scales, whirl: None, jobs: 1, limits };
+        let found = recognise(&trial, self.parameters, &response.state, false);
+        (response.recognition, response.state) = (found.evidence, found.state);
+        response.motion = match &found.nature {
+            Nature::Cycle(_) => Motion::Cycle,
+            Nature::Torus(_) => Motion::Torus,
+            Nature::Chaos => Motion::Chaos,
+            Nature::Undecided => Motion::Other,
+            Nature::Lost => Motion::Escaped,
+        };
+        match found.nature {
+            Nature::Cycle(period) => response.period = Some(period),
+            Nature::Torus(quasi) => (response.period, response.error) = (Some(quasi.interval), quasi.curve.residual),
+            _ => {}
+        }
     }
 
     /// Period of iterates `[WINDOW + 1][n]` that repeat themselves, and the largest difference.
@@ -417,9 +443,13 @@ fn response(own: &Iteration, free: usize, ended: &Ended) -> (Response, Option<Ca
         settled_after: ended.time as f64,
         error: ended.error,
         iterates: Vec::new(),
+        recognition: Default::default(),
     };
     if ended.motion == Motion::Escaped {
         return (response, None);
+    }
+    if ended.motion == Motion::Other {
+        own.recognised(&mut response);
     }
     let candidate = (ended.period > 0).then(|| own.candidate(&ended.states, ended.period));
     let count = if ended.period > 0 { ended.period } else { RECORDED };

@@ -5,10 +5,11 @@
 //! sampled uniformly in time; extrema are those of quartics through five samples.
 
 use super::Candidate;
+use super::recognition::{Found, Nature, recognise};
 use super::settling::{Settled, Trial};
 use super::spectrum::lines;
 use crate::contract::{Batch, Parameters, Verdict};
-use crate::diagram::{Motion, Response};
+use crate::diagram::{Motion, Recognition, Response};
 use crate::simulation::{Ensemble, Step, Tolerance};
 use num_complex::Complex64;
 
@@ -42,6 +43,7 @@ pub(super) fn response(
         settled_after: settled.time,
         error: settled.error,
         iterates: Vec::new(),
+        recognition: Recognition::default(),
     };
     let candidate = match settled.motion {
         Motion::Escaped => None,
@@ -50,12 +52,39 @@ pub(super) fn response(
             Some(Candidate::Equilibrium(settled.state.clone()))
         }
         Motion::Cycle => cycle(trial, parameters, settled, &mut response),
-        Motion::Other => {
-            other(trial, parameters, &mut response);
-            None
-        }
+        // Only recognition finds the other types, and it comes last.
+        Motion::Other | Motion::Torus | Motion::Chaos => unsettled(trial, parameters, settled, &mut response),
     };
     (response, candidate)
+}
+
+/// Recognises a motion that neither rests nor repeated itself.
+fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
+    let found = match &settled.found {
+        Some(found) => Found::clone(found),
+        None => recognise(trial, parameters, &settled.state, false),
+    };
+    (response.recognition, response.state) = (found.evidence, found.state);
+    match found.nature {
+        Nature::Cycle(period) => {
+            response.motion = Motion::Cycle;
+            let settled =
+                Settled { motion: Motion::Cycle, state: response.state.clone(), period, error: 0.0, ..settled.clone() };
+            return cycle(trial, parameters, &settled, response);
+        }
+        Nature::Torus(quasi) => {
+            (response.motion, response.period) = (Motion::Torus, Some(quasi.interval));
+            response.error = quasi.curve.residual;
+        }
+        Nature::Chaos => response.motion = Motion::Chaos,
+        Nature::Undecided => {}
+        Nature::Lost => {
+            response.motion = Motion::Escaped;
+            return None;
+        }
+    }
+    other(trial, parameters, response);
+    None
 }
 
 fn tolerance(trial: &Trial) -> Tolerance {

@@ -20,10 +20,14 @@
 //! A second set of modules simulates without solving any equation for the motions it finds (`brute_force`, `settling`,
 //! `runner`, `measure`), for comparison with branches.
 //!
+//! Motions that neither rest nor repeat are told apart as tori, locked cycles and chaos (`recognition`); a torus so found
+//! may start a branch (`wandering`).
+//!
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts
 //! so slowly that the returns do not contract measurably within the step limit.
 
 mod angles;
+mod birkhoff;
 mod brute_force;
 mod candidate;
 mod census;
@@ -31,6 +35,7 @@ mod driven;
 mod iterated;
 mod measure;
 mod orbit;
+mod recognition;
 mod returns;
 mod runner;
 mod sampling;
@@ -38,6 +43,8 @@ mod settling;
 mod spectrum;
 #[cfg(test)]
 mod tests;
+mod variation;
+mod wandering;
 mod watch;
 mod window;
 
@@ -54,6 +61,7 @@ pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
 pub(crate) use spectrum::ratio_of_samples;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
+pub use wandering::first_torus;
 
 use crate::contract::VectorField;
 use crate::diagram::{Point, Share};

@@ -191,6 +191,7 @@ impl Runner {
                 extent: extent.clone(),
                 time: self.time + step.end_time(),
                 error: latest(4),
+                found: None,
             });
         } else if !few && self.moves && self.repeats.is_none() && self.jumps < JUMPS && contracts(seen) {
             self.jumps += 1;
@@ -211,7 +212,8 @@ impl Runner {
             let state = (0..x.len()).map(|i| 0.5 * (window.high[i] + window.low[i])).collect();
             // With long steps the trajectory can stand still beside the equilibrium, within the integration tolerance.
             let error = size.max(INTEGRATION[usize::from(!self.is_rough())]);
-            self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error });
+            self.found =
+                Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error, found: None });
             return;
         }
         self.sizes.push(size);
@@ -312,7 +314,7 @@ impl Runner {
             let error = plane.seen.iter().rev().take(2 * SEEN).fold(0.0, |m: f64, (_, size)| m.max(*size));
             let repeats = self.moves && plane.seen.len() >= 2 * SEEN && error <= NEARLY;
             let (state, extent, time) = (state.to_vec(), self.extent.clone(), self.time);
-            repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
+            repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error, found: None })
         };
         self.planes.iter().flatten().find_map(of)
     }
@@ -327,8 +329,15 @@ impl Runner {
         }
         if self.found.is_none() && (gone || self.steps >= self.limit) {
             let motion = if gone { Motion::Escaped } else { Motion::Other };
-            self.found =
-                Some(Settled { motion, state: state.clone(), period: 0.0, extent, time: self.time, error: f64::NAN });
+            self.found = Some(Settled {
+                motion,
+                state: state.clone(),
+                period: 0.0,
+                extent,
+                time: self.time,
+                error: f64::NAN,
+                found: None,
+            });
         }
         self.start = self.next.take().unwrap_or(state);
     }

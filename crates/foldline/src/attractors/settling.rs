@@ -18,6 +18,7 @@
 //! **Fails when** a motion is neither at rest nor periodic, or contracts by less than 1/30 over a few thousand periods.
 
 use super::Limits;
+use super::recognition::{Found, Nature, recognise};
 use super::runner::{JUMPS, Runner};
 use crate::contract::VectorField;
 use crate::diagram::Motion;
@@ -68,6 +69,43 @@ pub(super) struct Settled {
     pub(super) extent: Vec<f64>,
     pub(super) time: f64,
     pub(super) error: f64,
+    /// Result of recognition, if it has decided.
+    pub(super) found: Option<Box<Found>>,
+}
+
+/// Settles like [`settle_together`], all at the parameters `[k]`; a motion that has not settled after part of the steps is
+/// recognised if that is possible, and goes on otherwise.
+pub(super) fn settle_or_recognise(trial: &Trial, parameters: &[f64], starts: &[f64], first: First) -> Vec<Settled> {
+    /// Steps after which recognition is tried: enough for most transients, and a fraction of the default limit.
+    const EARLY: usize = 50_000;
+    let (n, limits) = (trial.field.dim(), trial.limits_at(parameters));
+    let together = |starts: &[f64], first: First, limits: Limits| {
+        settle_together(trial, &parameters.repeat(starts.len() / n), starts, first, limits)
+    };
+    if limits.steps <= 2 * EARLY {
+        return together(starts, first, limits);
+    }
+    let mut all = together(starts, first, Limits { steps: EARLY, ..limits });
+    for own in all.iter_mut().filter(|own| own.motion == Motion::Other && !trial.field.ended()) {
+        let found = recognise(trial, parameters, &own.state, true);
+        // Chaos may be a transient.
+        if matches!(found.nature, Nature::Cycle(_) | Nature::Torus(_)) {
+            own.found = Some(Box::new(found));
+        }
+    }
+    let open: Vec<usize> =
+        (0..all.len()).filter(|k| all[*k].motion == Motion::Other && all[*k].found.is_none()).collect();
+    let from: Vec<f64> = open.iter().flat_map(|k| all[*k].state.clone()).collect();
+    let left = |own: &Settled| limits.time - own.time;
+    let time = open.iter().map(|k| left(&all[*k])).fold(0.0, f64::max);
+    if open.is_empty() || time <= 0.0 {
+        return all;
+    }
+    let later = together(&from, First::Accurate, Limits { steps: limits.steps - EARLY, time });
+    for (k, own) in open.into_iter().zip(later) {
+        all[k] = Settled { time: all[k].time + own.time, ..own };
+    }
+    all
 }
 
 /// Integrates trajectories together, each at its own parameters: `parameters` `[count][k]`, `starts` `[count][n]`.
@@ -115,6 +153,7 @@ pub(super) fn settle_together(
         extent: runner.extent,
         time: runner.time,
         error: f64::NAN,
+        found: None,
     };
     runners.into_iter().map(|mut runner| runner.found.take().unwrap_or_else(|| unsettled(runner))).collect()
 }

@@ -12,7 +12,7 @@ pub use cycle::Cycle;
 pub use design::{Answer, Binds, Design};
 pub use number::Shown;
 pub use record::{Misfit, Record};
-pub use response::{Motion, Response, Responses, Search};
+pub use response::{Motion, Recognition, Response, Responses, Search};
 pub use share::Share;
 pub use torus::Torus;
 

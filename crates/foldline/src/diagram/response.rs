@@ -9,7 +9,11 @@ pub enum Motion {
     Equilibrium,
     /// Periodic motion.
     Cycle,
-    /// Neither within the limit on the number of steps: chaos, a torus, or an approach too slow to tell.
+    /// Quasi-periodic motion with two frequencies: a torus or, for a map, a closed curve.
+    Torus,
+    /// Chaotic motion: its largest Lyapunov exponent is positive.
+    Chaos,
+    /// None of these by the criteria, within the limit on the number of steps; [`Recognition::reason`] says why.
     Other,
     /// The trajectory ran to infinity or out of the region in which f is defined, or its steps became too small.
     Escaped,
@@ -17,13 +21,16 @@ pub enum Motion {
 
 impl Motion {
     /// All types of motion.
-    pub const ALL: [Motion; 4] = [Motion::Equilibrium, Motion::Cycle, Motion::Other, Motion::Escaped];
+    pub const ALL: [Motion; 6] =
+        [Motion::Equilibrium, Motion::Cycle, Motion::Torus, Motion::Chaos, Motion::Other, Motion::Escaped];
 
     /// The name used in files and tables.
     pub fn name(self) -> &'static str {
         match self {
             Motion::Equilibrium => "equilibrium",
             Motion::Cycle => "cycle",
+            Motion::Torus => "torus",
+            Motion::Chaos => "chaos",
             Motion::Other => "other",
             Motion::Escaped => "escaped",
         }
@@ -35,6 +42,21 @@ impl Motion {
     }
 }
 
+/// Numbers by which a motion that neither rests nor repeats itself was recognised, or the reason why it was not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recognition {
+    /// Rotation number ρ of a torus, in turns per period, with its error; up to its sign and whole numbers, and between 0
+    /// and 1/2.
+    pub rotation: Option<[f64; 2]>,
+    /// Largest Lyapunov exponent other than the one along the motion, per unit of time of the model or per iteration,
+    /// with its error.
+    pub exponent: Option<[f64; 2]>,
+    /// Number of periods observed.
+    pub returns: usize,
+    /// Reason why the type was not decided; otherwise empty.
+    pub reason: String,
+}
+
 /// A settled motion at one value of a parameter. Every number comes from the trajectory itself.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
@@ -44,7 +66,8 @@ pub struct Response {
     pub parameters: Vec<f64>,
     /// Type of motion.
     pub motion: Motion,
-    /// Period of a cycle, from the returns of the trajectory.
+    /// Period of a cycle, from the returns of the trajectory; of a torus, the forcing periods after which its section closes
+    /// or, without forcing, the period of its strongest spectral line.
     pub period: Option<f64>,
     /// Spectral ratio of a cycle, such as 2:1, if the model has a whirl plane.
     pub ratio: Option<(u32, u32)>,
@@ -64,11 +87,14 @@ pub struct Response {
     /// Time until the motion had settled, without the time saved by extrapolation.
     pub settled_after: f64,
     /// For a cycle, its closing error relative to its extent. For an equilibrium, the remaining motion, but at least
-    /// the tolerance of the integration, relative to scale plus size.
+    /// the tolerance of the integration, relative to scale plus size. For a torus, the largest distance of a state from its
+    /// section, relative to the extent of that.
     pub error: f64,
     /// For a map, iterates of the motion: those of one period, or some of a motion that is not periodic; `[count][states
     /// and outputs]`. Empty otherwise, and in files of earlier versions.
     pub iterates: Vec<f64>,
+    /// Evidence for a torus, for chaos, or for a cycle that was recognised as slowly; empty otherwise.
+    pub recognition: Recognition,
 }
 
 impl Response {

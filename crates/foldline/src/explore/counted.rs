@@ -156,6 +156,14 @@ impl VectorField for Counted<'_> {
         self.field.linearise_outputs(at, free, to)
     }
 
+    fn second_phase(&self) -> Option<usize> {
+        self.field.second_phase()
+    }
+
+    fn second_turns(&self, parameters: &[f64]) -> (f64, Vec<f64>) {
+        self.field.second_turns(parameters)
+    }
+
     fn time_unit_slopes(&self, parameters: &[f64]) -> Vec<f64> {
         self.field.time_unit_slopes(parameters)
     }

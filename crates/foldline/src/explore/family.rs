@@ -9,6 +9,7 @@ use super::{System, arrival, connections, crossings, curves, discovery, holds, h
 use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
+use crate::special::quantity::Quantity;
 use std::ops::Range;
 
 /// A root: something that starts at a seed, or finds its own starts.
@@ -298,8 +299,9 @@ impl Work<'_> {
         };
         let mut branch = Branch::new(&plan.name, family, plan.free, origin);
         let begun = start.and_then(|point| {
-            if matches!(point.solution, Solution::Torus(_)) {
-                return Err("quantities cannot be held along tori".into());
+            let only_rotation = matches!(&plan.holds.levels[..], [level] if level.quantity == Quantity::Rotation);
+            if matches!(point.solution, Solution::Torus(_)) && !only_rotation {
+                return Err("along tori only the rotation number can be held, `hold = \"rotation\"`".into());
             }
             let moving: Vec<(usize, [f64; 2])> =
                 plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();

@@ -77,6 +77,11 @@ impl Line {
         degree: usize,
         point: &Point,
     ) -> Box<dyn ZeroProblem + 'a> {
+        if let (Solution::Torus(torus), [level]) = (&point.solution, &holds.levels[..])
+            && level.quantity == Quantity::Rotation
+        {
+            return Box::new(TorusProblem::like(setting, torus, Some(level.value)));
+        }
         let (like, surface): (Solution, Box<dyn ZeroProblem + 'a>) = match &point.solution {
             _ if system.field.iterated() => {
                 (point.solution.clone(), Box::new(MapProblem::like(setting.clone(), &point.solution)))

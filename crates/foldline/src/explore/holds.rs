@@ -10,6 +10,7 @@ use super::plan::{BranchPlan, Holds};
 use crate::continuation::{Settings, Station};
 use crate::diagram::{Branch, Kind, Point, Shown};
 use crate::special::on_levels::Level;
+use crate::special::quantity::Quantity;
 
 /// Shortest part of the way of the quantities to their values that is tried at once.
 const SHORTEST: f64 = 1.0 / 256.0;
@@ -70,6 +71,9 @@ pub fn on_branch(
 pub fn resolved(system: &System, holds: &Holds, start: &Point) -> Result<Holds, String> {
     let level = |own: &Level| {
         let here = own.quantity.on(start, system.field).filter(|value| value.is_finite()).ok_or_else(|| {
+            if own.quantity == Quantity::Rotation {
+                return "only tori have a rotation number that can be held; start from a branch of tori".to_string();
+            }
             format!(
                 "{} is not defined at the start\nlikely cause: equilibria have neither a period nor a phase, and without \
                  forcing the phase of a cycle is arbitrary\nwhat to do: hold another quantity",

@@ -88,7 +88,7 @@ pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource,
     Start, SurveyPlan, SweepPlan, Switching, Wanted,
 };
-pub use seeds::{attractors, first_solution};
+pub use seeds::{attractors, first_solution, unsettled_motions};
 pub use sizes::{scales_from, state_scales};
 pub use system::System;
 

@@ -31,6 +31,8 @@ pub enum SeedSource {
     Cycle(Cycle),
     /// The torus that the cycle from this source is, where the forcing does not act yet.
     Torus(Box<SeedSource>),
+    /// The torus on which a quasi-periodic motion lies that simulation meets.
+    QuasiPeriodic,
 }
 
 /// A first solution.

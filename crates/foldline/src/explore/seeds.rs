@@ -18,11 +18,11 @@ use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use super::profile::{Spread, first_profile, with_degree};
 use super::tori;
-use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
+use crate::attractors::{self, Attractor, Candidate, Census, Fate, Limits, Lost, Sampling, Trial};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
-use crate::contract::{Event, Examination, Observer, Unobserved};
-use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
+use crate::contract::{Event, Examination, Observer, Unobserved, Verdict};
+use crate::diagram::{Cost, Cycle, Diagram, Point, Response, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::problem::stiffness;
@@ -158,6 +158,9 @@ impl<'p> Seeds<'p> {
             return given.map(|(_, point)| with_degree(point.clone(), plan.degree)).ok_or("not needed".into());
         }
         system.repeats(&seed.parameters, &[])?;
+        if system.field.second_phase().is_some() && seed.source != SeedSource::QuasiPeriodic {
+            return Err("under two forcing frequencies the response is a torus; ask for `attractor = \"torus\"`".into());
+        }
         let point = match &seed.source {
             SeedSource::Cycle(cycle) if system.is_open() => from_arc(system, seed, plan.tolerance, cycle)?,
             SeedSource::Cycle(cycle) => {
@@ -170,6 +173,11 @@ impl<'p> Seeds<'p> {
                 from_state(system, seed, plan, state, self.jobs, &tell)?
             }
             SeedSource::Torus(source) => return tori::lifted(system, plan, seed, source, self.jobs),
+            SeedSource::QuasiPeriodic => {
+                let (point, said) = tori::met(system, plan, seed)?;
+                self.observer.observe(Event::Note(&seed.name, &said));
+                return Ok(point);
+            }
             SeedSource::Attractor(key) => {
                 if let Some(why) = in_families(system, seed) {
                     return Err(format!("no equilibrium is isolated{why}"));
@@ -275,7 +283,7 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
     let seed = &plan.seeds[index];
     let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
         SeedSource::Attractor(key) => Some(key),
-        SeedSource::Torus(_) | SeedSource::State(_) | SeedSource::Cycle(_) => None,
+        SeedSource::Torus(_) | SeedSource::QuasiPeriodic | SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
     let newton = if system.field.iterated() { None } else { newton_from_rest(system, plan, seed) };
@@ -327,6 +335,30 @@ pub fn attractors(
     attractors::survey(system.field, parameters, &sampling, &|candidate| {
         polish(system, parameters, tolerance, candidate)
     })
+}
+
+/// Types of the motions to which the first unsettled samples of a survey lead by simulation, at most eight; `samples` and
+/// `seed` are those of [`attractors`].
+pub fn unsettled_motions(
+    system: &System,
+    parameters: &[f64],
+    (samples, seed): (usize, u64),
+    census: &Census,
+    tolerance: f64,
+) -> Vec<Response> {
+    const EXAMINED: usize = 8;
+    let sampling = sampling(system, samples, seed, 1, tolerance);
+    let (starts, n) = (sampling.starts(), system.field.dim());
+    let open = census.fates.iter().enumerate().filter(|(_, fate)| **fate == Fate::Unsettled).take(EXAMINED);
+    let given: Vec<f64> = open.flat_map(|(k, _)| starts[k * n..(k + 1) * n].to_vec()).collect();
+    if given.is_empty() {
+        return Vec::new();
+    }
+    let limits = if system.limits == Limits::default() { Limits::patient() } else { system.limits };
+    let sampling = Sampling { samples: given.len() / n, given: Some(given), ..sampling };
+    let trial = Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs: 1, limits };
+    let value = parameters.first().copied().unwrap_or(0.0);
+    attractors::survey_by_simulation(&trial, &sampling, parameters, 0, &[value], &|_| Verdict::Continue)
 }
 
 /// Attractors reached from given initial states `[count][n]`, with the fate of each; see [`crate::attractors::survey_map`].

@@ -77,7 +77,9 @@ pub(super) fn places(model: &Model, plan: &Plan) -> Vec<Place> {
                 let states = cycle.profile.chunks_exact(n).step_by(1 + cycle.profile.len() / (4 * n));
                 starts.extend(states.map(|state| (state.to_vec(), seed.parameters.clone())));
             }
-            SeedSource::Attractor(_) | SeedSource::Torus(_) => starts.push(origin(model, &seed.parameters)),
+            SeedSource::Attractor(_) | SeedSource::Torus(_) | SeedSource::QuasiPeriodic => {
+                starts.push(origin(model, &seed.parameters))
+            }
         }
     }
     starts.extend(plan.explorations.iter().map(|own| origin(model, &own.parameters)));

@@ -165,7 +165,7 @@ impl<'a> System<'a> {
             | Quantity::Mean(k)
             | Quantity::Rms(k) => state(k),
             Quantity::Norm(_) => self.scales.iter().fold(0.0, |most, scale| scale.max(most)),
-            Quantity::Integral(_) => 1.0,
+            Quantity::Integral(_) | Quantity::Rotation => 1.0,
             Quantity::Period | Quantity::Frequency => 0.0,
             Quantity::Of(term) if !quantity.is_phase() => match term.signal {
                 Signal::Channel(k) => state(k),

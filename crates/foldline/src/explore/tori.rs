@@ -6,9 +6,10 @@
 use super::System;
 use super::growth::{Beginning, setting};
 use super::plan::{Plan, SeedPlan, SeedSource};
-use super::seeds::first_of;
+use super::seeds::{bare, first_of, sampling};
 use super::switch::{DISTANCES, joined, step_off};
 use super::unforced::{Unforced, acts};
+use crate::attractors::first_torus;
 use crate::continuation::{Settings, Station};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cycle, Point, Solution, SpecialPoint};
@@ -122,6 +123,33 @@ pub(super) fn lifted(
     };
     let torus = start::lifted(cycle, system.field.time_unit(&seed.parameters));
     Ok(Point { solution: Solution::Torus(torus), tangent: Vec::new(), ..point })
+}
+
+/// The torus of a quasi-periodic motion that the samples of a seed meet, and what is known of it.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub(super) fn met(system: &System, plan: &Plan, seed: &SeedPlan) -> Result<(Point, String), String> {
+    if let Some(why) = unsupported(system) {
+        return Err(why.into());
+    }
+    let sampling = sampling(system, seed.samples, seed.random, 1, plan.tolerance);
+    let (torus, known) = first_torus(system.field, &seed.parameters, &sampling, plan.degree)?;
+    if system.field.second_phase().is_some() {
+        let said = format!(
+            "response to both forcings: {:.9} turns of the second per period of the first; torus of {} trajectories",
+            torus.rotation,
+            torus.phases()
+        );
+        return Ok((bare(&seed.parameters, Solution::Torus(torus)), said));
+    }
+    let [rotation, error] = known.rotation.unwrap_or([f64::NAN; 2]);
+    let said = format!(
+        "quasi-periodic motion: rotation number {rotation:.9} ± {error:.0e} over {} periods; torus of {} trajectories",
+        known.returns,
+        torus.phases()
+    );
+    Ok((bare(&seed.parameters, Solution::Torus(torus)), said))
 }
 
 /// The text of an ending at a torus: what was tried, from the text of the continuation, then a likely cause and what can

@@ -44,6 +44,7 @@ mod source;
 mod switches;
 mod table;
 mod tape;
+mod tones;
 mod totals;
 mod unsupported;
 mod words;
@@ -132,6 +133,8 @@ struct Inner {
     compiled: Compiled,
     field: Tape,
     period: Option<Tape>,
+    /// Phase of a second forcing, and a field with its period.
+    second: Option<(usize, Model)>,
     /// `[n]`, or empty if no state is an angle; see [`VectorField::periods`].
     periods: Vec<f64>,
     /// True for a map.
@@ -187,6 +190,7 @@ impl Model {
         }
         let map = source.map;
         let (source, totals) = if source.totals.is_empty() { (source, Vec::new()) } else { totals::reduced(source)? };
+        let second = tones::second(&source)?;
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
         let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
@@ -224,6 +228,7 @@ impl Model {
             compiled,
             field,
             period,
+            second,
             periods,
             map,
             outputs,
@@ -492,6 +497,17 @@ impl VectorField for Model {
             self.period_tape(period).run(at, &[], &mut [&mut slopes]);
         }
         slopes
+    }
+
+    fn second_phase(&self) -> Option<usize> {
+        Some(self.inner.second.as_ref()?.0)
+    }
+
+    fn second_turns(&self, parameters: &[f64]) -> (f64, Vec<f64>) {
+        let Some((_, second)) = &self.inner.second else { return (0.0, vec![0.0; parameters.len()]) };
+        let (own, other) = (self.time_unit(parameters), second.time_unit(parameters));
+        let slopes = self.time_unit_slopes(parameters).into_iter().zip(second.time_unit_slopes(parameters));
+        (own / other, slopes.map(|(a, b)| (a - own / other * b) / other).collect())
     }
 
     fn periods(&self) -> &[f64] {

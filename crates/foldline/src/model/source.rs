@@ -222,6 +222,9 @@ pub struct ModelSource {
     pub parameters: Vec<Parameter>,
     /// Forcing, if expressions use the time `t`.
     pub forcing: Option<Forcing>,
+    /// A second forcing, whose frequency need not have a ratio to that of the first, and the name of the parameter that
+    /// is its phase in turns.
+    pub second: Option<(Forcing, String)>,
     /// Intermediate expressions, in any order.
     pub definitions: Vec<Definition>,
     /// States, in the order in which they are numbered.

@@ -60,9 +60,9 @@ const KINDS: [Kind; 15] = [
     ),
     (
         &["frequencie", "secondfrequency", "frequency2"],
-        "two forcing frequencies are not supported",
-        "if their ratio is m:n, give the common period, as in `period = \"2*pi*n/omega\"`; the response is then a \
-         cycle",
+        "two forcing frequencies belong in a list `frequencies`",
+        "write `frequencies = [\"Omega\", \"nu\"]` under [forcing], and `t1` and `t2` for the time in the terms of each; if \
+         their ratio is m:n, give the common period, as in `period = \"2*pi*n/omega\"`: the response is then a cycle",
     ),
     (
         &["noise", "stochastic", "diffusion", "sde", "wiener"],

@@ -454,6 +454,8 @@ impl<'a> Along<'a> {
                 found.value = value;
                 Some((found, None))
             }
+            // Held by the problem of tori itself.
+            Quantity::Rotation => None,
             Quantity::Smallest(k) => self.term(term(k, Measured::Smallest), near),
             Quantity::Largest(k) => self.term(term(k, Measured::Largest), near),
             Quantity::Mean(k) => self.term(term(k, Measured::Mean), None),

@@ -15,6 +15,8 @@ pub enum Quantity {
     Period,
     /// 1/period of a cycle; undefined for equilibria.
     Frequency,
+    /// Rotation number of a torus; undefined for other solutions.
+    Rotation,
     /// Smallest value of a state or output over the solution.
     Smallest(usize),
     /// Largest value of a state or output over the solution.
@@ -77,6 +79,10 @@ impl Quantity {
             Quantity::Parameter(k) => point.parameters.get(k).copied(),
             Quantity::Period => point.solution.period(),
             Quantity::Frequency => point.solution.period().map(|period| 1.0 / period),
+            Quantity::Rotation => match &point.solution {
+                Solution::Torus(torus) => Some(torus.rotation),
+                _ => None,
+            },
             Quantity::Smallest(k) => point.ranges.get(k).map(|range| range[0]),
             Quantity::Largest(k) => point.ranges.get(k).map(|range| range[1]),
             Quantity::Iterate(k, number) => iterate(point, k, number),
@@ -132,6 +138,7 @@ impl Quantity {
             Quantity::Parameter(_) => "the parameter".into(),
             Quantity::Period => "period".into(),
             Quantity::Frequency => "frequency".into(),
+            Quantity::Rotation => "rotation".into(),
             Quantity::Norm(_) => "norm".into(),
             Quantity::Smallest(k) => format!("{}_min", own(k)),
             Quantity::Largest(k) => format!("{}_max", own(k)),
@@ -178,7 +185,11 @@ impl Quantity {
             Quantity::Of(term) => of(term),
             Quantity::Difference(..) => "deg",
             Quantity::Decibels(_) | Quantity::RatioDecibels(..) => "dB",
-            Quantity::Frequency | Quantity::Integral(_) | Quantity::Norm(_) | Quantity::Ratio(..) => "",
+            Quantity::Frequency
+            | Quantity::Rotation
+            | Quantity::Integral(_)
+            | Quantity::Norm(_)
+            | Quantity::Ratio(..) => "",
         }
     }
 
@@ -192,7 +203,7 @@ impl Quantity {
         a.into_iter().chain(b)
     }
 
-    /// Returns the quantity with the given name: a parameter, `period`, `frequency`, `norm`; NAME_max, NAME_min,
+    /// Returns the quantity with the given name: a parameter, `period`, `frequency`, `rotation` of a torus, `norm`; NAME_max, NAME_min,
     /// NAME_mean, NAME_rms or NAME_integral of a state or output; NAME_h1 or NAME_h1_phase of a harmonic, a ratio A/B,
     /// a difference of phases A - B, or one of these followed by `_dB`. For a boundary-value problem also NAME@0, NAME@1 or
     /// NAME@0.5, the value of a state at a place relative to the length of the interval.
@@ -211,6 +222,7 @@ impl Quantity {
         match name {
             "period" => Some(Quantity::Period),
             "frequency" => Some(Quantity::Frequency),
+            "rotation" => Some(Quantity::Rotation),
             "norm" => Some(Quantity::Norm(model.states.len())),
             _ => ended().or_else(|| made_of_terms(name, model)),
         }
@@ -224,7 +236,11 @@ impl Quantity {
         let ends: Vec<String> = ends.collect();
         let ended = channels.flat_map(|name| ENDINGS.map(|(ending, _)| format!("{name}{ending}")));
         let parameters = model.parameters.iter().map(|p| p.name.clone());
-        parameters.chain(["period".into(), "frequency".into(), "norm".into()]).chain(ended).chain(ends).collect()
+        parameters
+            .chain(["period".into(), "frequency".into(), "rotation".into(), "norm".into()])
+            .chain(ended)
+            .chain(ends)
+            .collect()
     }
 }
 

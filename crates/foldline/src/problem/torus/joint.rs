@@ -27,7 +27,11 @@ pub(super) struct Joint {
 impl TorusProblem<'_> {
     /// Number of border rows that act on the profile besides those of a call: the phase conditions.
     pub(super) fn phase_count(&self) -> usize {
-        if self.forcing_periods > 0 { 1 } else { 2 }
+        match (self.second, self.forcing_periods) {
+            (Some(_), _) => 0,
+            (None, 0) => 2,
+            _ => 1,
+        }
     }
 
     /// Factorises (1) and (2) from the eliminated segments, with `rows` `[k][unknowns]`.
@@ -80,7 +84,19 @@ impl TorusProblem<'_> {
         // Prescribed scalars: T under forcing, ρ if it is held, and scalars that only make room.
         let forced = (self.forcing_periods > 0).then_some(0);
         let prescribed = forced.into_iter().chain(self.held.map(|_| q)).chain(1 + free..q);
-        for (at, scalar) in (base + borders..order).zip(prescribed) {
+        let mut at = base + borders;
+        if self.second.is_some() {
+            // ρ of the second forcing.
+            let (_, slopes) = self.setting.field.second_turns(&self.setting.at(&u[size + 2..]));
+            let own = |c: usize| -> f64 {
+                let unknown: Vec<f64> = (0..free).map(|k| f64::from(u8::from(k == c))).collect();
+                self.setting.spread(&unknown).iter().zip(&slopes).map(|(a, b)| a * b).sum()
+            };
+            a[(at, base + q)] = 1.0;
+            (0..free).for_each(|c| a[(at, base + 1 + c)] = -own(c));
+            at += 1;
+        }
+        for (at, scalar) in (at..order).zip(prescribed) {
             a[(at, base + scalar)] = 1.0;
         }
         let factors = Factored::new(a.as_ref());
@@ -110,8 +126,14 @@ impl TorusProblem<'_> {
         }
         // The residuals behind the profile: T or the phase in time, the phase, ρ if it is held, the rows.
         let behind = &rhs[size..];
-        b[(base, 0)] += behind[1];
         let mut at = base + borders;
+        match self.second {
+            None => b[(base, 0)] += behind[1],
+            Some(_) => {
+                b[(at, 0)] += behind[1];
+                at += 1;
+            }
+        }
         match self.forcing_periods {
             0 => b[(base + 1, 0)] += behind[0],
             _ => {

@@ -15,6 +15,9 @@
 //!   (5)  ρ = ρ_0                                        if the rotation number is held
 //! ```
 //!
+//! With a second forcing its turns per period are ρ(λ), which replaces (3), and segment k has its phase at φ_k: the phase on
+//! the curve is that of the second forcing.
+//!
 //! Stability: with G_k the transition matrix of segment k over T, the operator L = R(-ρ) diag(G_k) acts on perturbations
 //! of the closed curve. Its eigenvalues lie on n circles; see [`stability`].
 //!
@@ -50,6 +53,8 @@ pub struct TorusProblem<'a> {
     n: usize,
     /// q of (4); 0 for an autonomous field.
     forcing_periods: u32,
+    /// Parameter that is the phase of a second forcing, and ρ of that with its derivatives at the last evaluation.
+    second: Option<usize>,
     /// ρ_0 of (5).
     held: Option<f64>,
     /// The mesh in time and phase, its part in time, and K.
@@ -78,6 +83,7 @@ impl<'a> TorusProblem<'a> {
             scheme: Scheme::new(torus.degree),
             n: setting.field.dim(),
             forcing_periods: torus.forcing_periods,
+            second: setting.field.second_phase(),
             held,
             mesh: Mesh::default(),
             time: Mesh::default(),
@@ -231,7 +237,10 @@ impl ZeroProblem for TorusProblem<'_> {
             self.put(&defects, k, r);
         }
         let off: Vec<f64> = u[..size].iter().zip(&self.anchored).map(|(a, b)| a - b).collect();
-        r[size + 1] = self.dot_profiles(&off, &self.directions[0]);
+        r[size + 1] = match self.second {
+            None => self.dot_profiles(&off, &self.directions[0]),
+            Some(_) => u[size + 1] - self.setting.field.second_turns(&self.setting.at(&u[size + 2..])).0,
+        };
         r[size] = match self.forcing_periods {
             0 => self.dot_profiles(&off, &self.directions[1]),
             q => u[size] - f64::from(q),
@@ -251,6 +260,7 @@ impl ZeroProblem for TorusProblem<'_> {
         let profiles: Vec<&[f64]> = self
             .directions
             .iter()
+            .filter(|_| self.second.is_none())
             .map(Vec::as_slice)
             .chain(rows.chunks_exact(u.len()).map(|row| &row[..size]))
             .collect();
@@ -293,10 +303,17 @@ impl ZeroProblem for TorusProblem<'_> {
         }
         let (time, count) = (phases::in_time(mesh), phases::count(mesh));
         let (degree, rows) = (self.scheme.degree, self.phase_count() + 1);
+        if self.second.is_some() && count != self.phases {
+            self.segments.clear();
+        }
         self.segments.truncate(count);
         self.segments.iter_mut().for_each(|own| own.move_to(&time));
         while self.segments.len() < count {
-            let own = CycleProblem::segment(self.setting.clone(), degree, &time, self.forcing_periods, rows);
+            let mut setting = self.setting.clone();
+            if let Some(phase) = self.second {
+                setting.parameters[phase] += self.segments.len() as f64 / count as f64;
+            }
+            let own = CycleProblem::segment(setting, degree, &time, self.forcing_periods, rows);
             self.segments.push(own);
         }
         (self.mesh, self.time, self.phases) = (mesh.clone(), time, count);

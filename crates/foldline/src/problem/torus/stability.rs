@@ -41,9 +41,11 @@ impl TorusProblem<'_> {
     /// Multipliers per period, the trivial ones first, from the last factorisation.
     pub(super) fn spectrum(&self) -> Examination {
         let trivial = self.phase_count();
+        // The phase of a second forcing is neutral.
+        let given = usize::from(self.second.is_some());
         let unknown = || Examination {
-            spectrum: vec![Complex64::new(f64::NAN, f64::NAN); self.n],
-            trivial,
+            spectrum: vec![Complex64::new(f64::NAN, f64::NAN); self.n + given],
+            trivial: trivial + given,
             ..Examination::default()
         };
         let Some(mut found) = self.representatives() else { return unknown() };
@@ -62,6 +64,8 @@ impl TorusProblem<'_> {
             ..Trust::default()
         };
         let unstable = found[trivial..].iter().filter(|z| z.norm() > 1.0).count();
+        let trivial = trivial + given;
+        found.splice(0..0, vec![Complex64::new(1.0, 0.0); given]);
         Examination { spectrum: found, trivial, unstable, trust, ..Examination::default() }
     }
 

@@ -57,6 +57,21 @@ fn laid(like: Torus, n: usize, count: usize, time: &Mesh, at: impl Fn(usize, usi
     Torus { mesh: phases::joined(time, count), profile, ..like }
 }
 
+/// The torus whose trajectories have the states `at(k, t)` at the normalised time t, on a uniform mesh.
+pub fn of_trajectories(
+    like: Torus,
+    n: usize,
+    count: usize,
+    intervals: usize,
+    at: impl Fn(usize, f64, &mut [f64]),
+) -> Torus {
+    let (scheme, time, m) = (Scheme::of(like.degree), mesh::uniform(intervals), like.degree);
+    laid(like, n, count, &time, |k, node, x| {
+        let (j, i) = (node / (m + 1), node % (m + 1));
+        at(k, time[j] + (time[j + 1] - time[j]) * scheme.nodes[i], x);
+    })
+}
+
 /// The torus (1) of amplitude zero at a torus point of a cycle, and the profile of its direction; `None` if no such
 /// multiplier is found.
 pub fn at_torus_point(setting: Setting, cycle: &Cycle, multiplier: Complex64) -> Option<(Torus, Vec<f64>)> {
