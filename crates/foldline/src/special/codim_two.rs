@@ -123,7 +123,10 @@ impl CodimensionTwo<'_> {
             }
             Kind::BogdanovTakens if self.held != Kind::Hopf => {
                 let [q, p] = self.oriented(reference, at)?;
-                dot(&p, &q)
+                let own = dot(&p, &q);
+                // In a conservative system the eigenvalue 0 is double all along the curve.
+                let [q, p] = Local::new(self.field, reference)?.null_vectors()?;
+                if own.abs().max(dot(&p, &q).abs()) < DOUBLE { DOUBLE } else { own }
             }
             Kind::BogdanovTakens => (held.first()? * held.get(1)?).re,
             Kind::GeneralisedHopf => Local::new(self.field, at)?.hopf(held.first()?.im.abs())?,
