@@ -177,6 +177,30 @@ fn what_is_neutral_all_along_makes_no_special_points_and_what_crosses_together_i
             within: 1e-9,
             exit: 0,
         },
+        Case {
+            name: "two pairs that exchange sides within a step",
+            model: "[parameters]\nmu = -0.53\n[states]\nx = \"mu*x - y - x*(x^2 + y^2)\"\ny = \"x + mu*y - y*(x^2 + y^2)\"\n\
+                    u = \"-(mu - 0.001)*u - 2*v - u*(u^2 + v^2)\"\nv = \"2*u - (mu - 0.001)*v - v*(u^2 + v^2)\"\n"
+                .into(),
+            study: Box::leak(study("\"zero\"", "", "mu", "[-1.3, 1.1]", "").into_boxed_str()),
+            tolerance: usual,
+            branch: "b",
+            special: vec![("hopf", 0.0, [2, 4]), ("hopf", 0.001, [4, 2])],
+            within: 1e-9,
+            exit: 0,
+        },
+        Case {
+            name: "two real eigenvalues that exchange sides around a Hopf point",
+            model: "[parameters]\nmu = -0.53\n[states]\nx = \"mu*x - y - x*(x^2 + y^2)\"\ny = \"x + mu*y - y*(x^2 + y^2)\"\n\
+                    u = \"-(mu + 0.001)*u - u^3\"\nv = \"(mu - 0.001)*v - v^3\"\n"
+                .into(),
+            study: Box::leak(study("\"zero\"", "", "mu", "[-1.3, 1.1]", "").into_boxed_str()),
+            tolerance: usual,
+            branch: "b",
+            special: vec![("branch-point", -0.001, [1, 0]), ("hopf", 0.0, [0, 2]), ("branch-point", 0.001, [2, 3])],
+            within: 1e-8,
+            exit: 0,
+        },
     ];
     let mut wrong = Vec::new();
     for case in &cases {

@@ -208,16 +208,23 @@ impl Follow<'_> {
         }
         let mut cut_there = None;
         let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
-        if self.settings.stability && quiet && fold_test == FoldTest::Slope && depth < CLOSE {
+        let found: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
+        let fits = !lost && explains(&found, left.point.unstable as i64, right.point.unstable as i64);
+        if self.settings.stability && fits && fold_test == FoldTest::Slope && depth < CLOSE {
             match self.exchanged(&stretch, &right.point, history, cost) {
                 Some(Exchange::Apart(there)) => cut_there = Some(there),
-                Some(Exchange::Together(kind, found)) => {
-                    for _ in 0..if kind == Kind::PeriodDoubling { 2 } else { 1 } {
-                        located.push((kind, usize::from(kind == Kind::PeriodDoubling), (*found).clone()));
+                Some(Exchange::Together(kind, found)) if quiet => {
+                    let (times, jump) = match kind {
+                        Kind::PeriodDoubling => (2, 1),
+                        Kind::Hopf | Kind::Torus => (2, 2),
+                        _ => (1, 0),
+                    };
+                    for _ in 0..times {
+                        located.push((kind, jump, (*found).clone()));
                         others.push(None);
                     }
                 }
-                None => {}
+                Some(Exchange::Together(..)) | None => {}
             }
         }
         // If both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed sign. That is
@@ -278,12 +285,17 @@ impl Follow<'_> {
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
             && work(cost.factorisations, &left.mesh) < ALLOWANCE
-            && (jumps.len() > 1 || !explained || misplaced || misfit.is_some() || (suspicious && jumps.is_empty()))
+            && (jumps.len() > 1
+                || !explained
+                || misplaced
+                || misfit.is_some()
+                || cut_there.is_some()
+                || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
-                _ => misfit.or(seen).unwrap_or(0.5 * stretch.length),
+                _ => misfit.or(cut_there).or(seen).unwrap_or(0.5 * stretch.length),
             };
             // Neighbouring special points that can no longer be told apart stay together.
             let together = if short { CLOSEST } else { 1e-7 * (1.0 + stretch.length) };

@@ -1,10 +1,11 @@
 //! Eigenvalues that cross in opposite directions on one step.
 //!
 //! **Idea.** If two real eigenvalues pass 0 (multipliers: 1 or -1) on one step, one upwards and one downwards, neither
-//! the number of unstable ones nor the sign of a test function differs at the ends. Two real eigenvalues on either side
-//! that are about to exchange sides are therefore followed through the step, each as the one that is closest to the line
-//! between its two ends. If both vanish at different places, the step is cut in between; if at the same place, the null
-//! space there has two dimensions.
+//! the number of unstable ones nor the sign of a test function differs at the ends. The same holds for two complex pairs
+//! and the imaginary axis (the unit circle). Two real eigenvalues, or growth rates of pairs, on either side that are about
+//! to exchange sides are therefore followed through the step, each as the one that is closest to the line between its two
+//! ends. If both vanish at different places, the step is cut in between; if at the same place, the critical space there
+//! has two dimensions, or two pairs.
 //!
 //! **Equations.** With a₊ > 0 > a₋ the distances at the left end that are closest to 0, b₊ and b₋ those at the right end
 //! at distance L, and a′ the rates of change on the step before:
@@ -39,17 +40,34 @@ const HALVINGS: usize = 50;
 /// Factor by which the trend of the step before may fall short.
 const TREND: f64 = 1.5;
 
-/// Distances from `centre` of the real eigenvalues closest to it, above and below.
-fn beside(spectrum: &[Complex64], centre: f64) -> Option<[f64; 2]> {
-    let real = || spectrum.iter().filter(|z| z.im == 0.0).map(|z| z.re - centre);
-    let above = real().filter(|x| *x > 0.0).min_by(f64::total_cmp)?;
-    let below = real().filter(|x| *x < 0.0).max_by(f64::total_cmp)?;
-    Some([above, below])
+/// Values of which two may exchange sides.
+#[derive(Clone, Copy)]
+enum Values {
+    /// Distances of real eigenvalues from this one.
+    Real(f64),
+    /// Growth rates of complex pairs: real parts of eigenvalues, or logarithms of the moduli of multipliers.
+    Rates { of_cycle: bool },
+}
+
+impl Values {
+    fn all(self, spectrum: &[Complex64]) -> impl Iterator<Item = f64> + '_ {
+        spectrum.iter().filter_map(move |z| match self {
+            Values::Real(centre) => (z.im == 0.0).then_some(z.re - centre),
+            Values::Rates { of_cycle } => (z.im > 0.0).then(|| if of_cycle { z.norm().ln() } else { z.re }),
+        })
+    }
+
+    /// Those closest to 0, above and below.
+    fn beside(self, spectrum: &[Complex64]) -> Option<[f64; 2]> {
+        let above = self.all(spectrum).filter(|x| *x > 0.0).min_by(f64::total_cmp)?;
+        let below = self.all(spectrum).filter(|x| *x < 0.0).max_by(f64::total_cmp)?;
+        Some([above, below])
+    }
 }
 
 /// Points of a step and the one before it, as far as the search needs them.
 struct Lines {
-    centre: f64,
+    values: Values,
     /// Values at the left end, above and below.
     from: [f64; 2],
     /// Values at the right end to which they lead.
@@ -58,11 +76,10 @@ struct Lines {
 }
 
 impl Lines {
-    /// The eigenvalue of `at` that is closest to line `k` at distance s.
+    /// The value of `at` that is closest to line `k` at distance s.
     fn value(&self, k: usize, s: f64, at: &Point) -> Option<f64> {
         let expected = self.from[k] + (self.to[k] - self.from[k]) * s / self.length;
-        let real = at.free_spectrum().iter().filter(|z| z.im == 0.0).map(|z| z.re - self.centre);
-        real.min_by(|a, b| (a - expected).abs().total_cmp(&(b - expected).abs()))
+        self.values.all(at.free_spectrum()).min_by(|a, b| (a - expected).abs().total_cmp(&(b - expected).abs()))
     }
 }
 
@@ -77,21 +94,29 @@ impl Follow<'_> {
     ) -> Option<Exchange> {
         let (history, left) = (history?, &stretch.left.point);
         let of_cycle = left.solution.period().is_some();
+        let pairs = Values::Rates { of_cycle };
         let kinds = [
-            (0.0, Kind::BranchPoint, !of_cycle),
-            (1.0, Kind::BranchPoint, of_cycle),
-            (-1.0, Kind::PeriodDoubling, of_cycle),
+            (Values::Real(0.0), Kind::BranchPoint, !of_cycle),
+            (Values::Real(1.0), Kind::BranchPoint, of_cycle),
+            (Values::Real(-1.0), Kind::PeriodDoubling, of_cycle),
+            (pairs, Kind::Hopf, !of_cycle),
+            (pairs, Kind::Torus, of_cycle),
         ];
-        for (centre, kind, _) in kinds.into_iter().filter(|(.., applies)| *applies) {
+        for (values, kind, _) in kinds.into_iter().filter(|(.., applies)| *applies) {
             let skipped = left.spectrum.len() - left.free_spectrum().len();
-            let before = history.spectrum.get(skipped..).and_then(|own| beside(own, centre));
-            let ends = [left, right].map(|point| beside(point.free_spectrum(), centre));
+            let before = history.spectrum.get(skipped..).and_then(|own| values.beside(own));
+            let ends = [left, right].map(|point| values.beside(point.free_spectrum()));
             let (Some(before), [Some(from), Some(to)]) = (before, ends) else { continue };
             let trend = |k: usize| from[k] + TREND * stretch.length.abs() * (from[k] - before[k]) / history.distance;
             if trend(0) > 0.0 || trend(1) < 0.0 {
                 continue;
             }
-            let lines = Lines { centre, from, to: [to[1], to[0]], length: stretch.length };
+            // Of multipliers on the unit circle within their error, as in conservative systems, the side is arbitrary.
+            let least = if of_cycle { left.neutral_error() } else { 0.0 };
+            if from.iter().chain(&to).any(|value| value.abs() <= least) {
+                continue;
+            }
+            let lines = Lines { values, from, to: [to[1], to[0]], length: stretch.length };
             let found = [0, 1].map(|k| self.zero_of(stretch, &lines, k, cost));
             let [Some(first), Some(second)] = found else { continue };
             let gap = (first - second).abs();
