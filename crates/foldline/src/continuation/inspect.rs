@@ -13,7 +13,7 @@ use super::locate::{Located, Stretch, discrepancy, head_along, locate};
 use super::opposite::{Around, Exchange};
 use super::straddle::straddle;
 use crate::contract::Sight;
-use crate::diagram::{Cost, Kind, NULL_SPACE, Point, STANDS, SpecialPoint};
+use crate::diagram::{Cost, Kind, NULL_SPACE, Point, STANDS, Solution, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -350,7 +350,9 @@ impl Follow<'_> {
                 (_, true) => leading_to(count, target, jumps[index], &jumps[index + 1..]),
                 (_, false) => step_towards(count, target, jumps[index]),
             };
-            let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
+            // The multipliers of a torus may need more phases than the torus does, and its meshes do not show that.
+            let doubtful = self.problem.is_switched() || matches!(found.station.point.solution, Solution::Torus(_));
+            let rate = if doubtful { self.rate_beside(&found.station) } else { 0.0 };
             let null = match kind {
                 Kind::BranchPoint if self.settings.stability => {
                     let (ends, at) = ([&left.point, &right.point], &found.station.point);
@@ -567,7 +569,7 @@ impl Follow<'_> {
         rate.max(self.problem.relative_size(&at.tangent, &at.u))
     }
 
-    /// Displacement along the branch of a special point on a cycle with discontinuous f_x: the error of the critical
+    /// Displacement along the branch of a special point on a cycle with discontinuous f_x, or on a torus: the error of the critical
     /// multiplier over the rate at which it crosses the unit circle. On smooth fields the comparison of two meshes
     /// provides it, and folds lie where the branch turns, whatever the multipliers.
     fn displacement(&self, stretch: &Stretch, right: &Station, special: &SpecialPoint) -> f64 {
