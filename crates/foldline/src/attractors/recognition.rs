@@ -6,7 +6,8 @@
 //! decide, the trajectory goes on for twice as many intervals.
 //!
 //! **Equations.** In order, with states relative to their extents, the exponent λ ± ε per interval other than that along
-//! the motion, and the rotation number ρ ± δ, the difference between both halves of the record:
+//! the motion, and the rotation number ρ ± δ, the difference between both halves of the
+//! record, and at least the distance of the states from the curve over N:
 //!
 //! ```text
 //!   (1)  cycle of q intervals:  |x_{j+q} - x_j| ≤ 1e-6 and |x_{j+mq} - x_j| ≤ 1e-6 for all j and m,  λ + ε < 0
@@ -342,7 +343,9 @@ impl Watch<'_> {
             halves = own.halves().map(|half| half.sharpened(&curve, ENOUGH));
         }
         let rounding = if self.field.iterated() { 1e-14 } else { 10.0 * ACCURACY };
-        let error = (halves[0].turn - halves[1].turn).abs().max(rounding);
+        // The halves may agree by chance: states that far off the curve displace a line by that share of a turn over the record.
+        let blurred = curve.residual / count as f64;
+        let error = (halves[0].turn - halves[1].turn).abs().max(rounding).max(blurred);
         evidence.rotation = Some([curve.turn, error]);
         let change = (halves[0].amplitude(n) / halves[1].amplitude(n)).ln().abs();
         let idle = growth.is_none_or(|[rate, error]| rate.abs() <= 3.0 * error || rate.abs() * count as f64 <= 0.5);
