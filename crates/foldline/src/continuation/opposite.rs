@@ -21,7 +21,7 @@ use super::follow::Follow;
 use super::inspect::History;
 use super::locate::{Located, Stretch};
 use crate::diagram::{Cost, Kind, Point};
-use crate::stability::neutral;
+use crate::linalg::neutral;
 use num_complex::Complex64;
 
 /// Outcome for two eigenvalues on opposite sides.

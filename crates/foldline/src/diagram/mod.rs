@@ -1,5 +1,6 @@
 //! Results as plain data: points, special points, branches, diagrams.
 
+mod conservative;
 mod cycle;
 mod design;
 mod number;
@@ -16,7 +17,6 @@ pub use response::{Motion, Recognition, Response, Responses, Search};
 pub use share::Share;
 pub use torus::Torus;
 
-use crate::stability::neutral;
 use num_complex::Complex64;
 use std::fmt;
 use std::sync::Arc;
@@ -247,22 +247,6 @@ impl Point {
         let circle = if known && self.is_one_of_family() { error } else { 0.0 };
         let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0 + circle));
         self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + circle).count() - own
-    }
-
-    /// Counts the unstable multipliers of a cycle of a forced conservative system: those outside the unit circle by more
-    /// than their error.
-    pub(crate) fn count_if_conservative(&mut self) {
-        let margin = self.conservative_margin();
-        if margin > 0.0 {
-            self.unstable = self.spectrum.iter().filter(|z| z.norm() > 1.0 + margin).count();
-        }
-    }
-
-    /// Distance from the unit circle within which multipliers of a forced conservative system are on it: their error. 0 in
-    /// other systems.
-    pub(crate) fn conservative_margin(&self) -> f64 {
-        let error = self.neutral_error();
-        if neutral::reciprocal(self, error).is_some() { error } else { 0.0 }
     }
 
     /// True if the multipliers come in reciprocal pairs, as in a conservative system: besides the one that is 1, two

@@ -37,11 +37,11 @@ pub struct Crossings {
     pub beginnings: Vec<Beginning>,
     /// Number of directions tried.
     pub directions: usize,
-    /// What they are together.
+    /// Their relation to each other.
     pub sets: Sets,
 }
 
-/// What the branches that leave a null space are together.
+/// Relation of the branches that leave a null space.
 pub enum Sets {
     /// All that were found are isolated.
     Discrete,

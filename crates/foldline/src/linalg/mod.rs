@@ -14,6 +14,7 @@ pub mod ends;
 pub mod lane;
 pub mod local;
 pub mod lu;
+pub mod neutral;
 pub mod panel;
 pub mod periodic_schur;
 pub mod reflect;

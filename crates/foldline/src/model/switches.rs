@@ -32,7 +32,7 @@ pub(super) struct Switches {
     pub count: usize,
     /// Values of the switches.
     pub values: Tape,
-    /// The same with given signs, if some switches depend on the branch of others, as `mod(t, T) < c` does: their values
+    /// Values of the switches with given signs, if some switches depend on the branch of others, as `mod(t, T) < c` does: their values
     /// jump, which does not show at the place of the jump itself.
     pub given_values: Option<Tape>,
     /// Graph and nodes of the switches.

@@ -7,9 +7,9 @@ use super::Setting;
 use super::unfolding::Unfolding;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Trust};
-use crate::linalg::{axpy, dot, larger, lu, max_abs};
+use crate::linalg::{axpy, dot, larger, lu, max_abs, neutral};
 use crate::problem::{averages, extremes};
-use crate::stability::{eigenvalues, neutral};
+use crate::stability::eigenvalues;
 use num_complex::Complex64;
 
 /// Equilibria in one free parameter (a curve) or several.

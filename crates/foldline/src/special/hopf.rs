@@ -10,9 +10,9 @@
 use crate::contract::{Batch, Parameters};
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Kind, Mesh, Point, Solution};
-use crate::linalg::{lu, max_abs};
+use crate::linalg::{lu, max_abs, neutral};
 use crate::problem::gauss::Scheme;
-use crate::stability::{eigenvalues, neutral};
+use crate::stability::eigenvalues;
 use num_complex::Complex64;
 
 /// Sum of two eigenvalues.

@@ -3,7 +3,6 @@
 use crate::contract::Monitor;
 use crate::diagram::{Kind, Point};
 use crate::linalg::dense::MANY;
-use crate::stability::neutral;
 use num_complex::Complex64;
 
 /// Distance of a product of two multipliers from 1 that is rounding: those of an area-preserving map have the product 1
@@ -28,8 +27,7 @@ impl Monitor for Torus {
         let z = at.free_spectrum();
         // Products that are 1 all along have arbitrary sides.
         let error = reference.neutral_error();
-        let neutral =
-            neutral::reciprocal(reference, error).and_then(|_| neutral::reciprocal(at, error)).unwrap_or_default();
+        let neutral = reference.reciprocal_pairs(error).and_then(|_| at.reciprocal_pairs(error)).unwrap_or_default();
         let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| [i, j]));
         let counts = |[i, j]: &[usize; 2]| !neutral.contains(&[*i, *j]) && !neutral.contains(&[*j, *i]);
         let factors = pairs.filter(counts).map(|[i, j]| z[i] * z[j]).map(off);

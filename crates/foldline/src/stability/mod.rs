@@ -2,7 +2,6 @@
 
 mod explicit;
 pub mod floquet;
-pub mod neutral;
 mod reduction;
 
 use crate::linalg::periodic_schur;

@@ -1,4 +1,4 @@
-//! Eigenvalues of equilibria, and multipliers of forced cycles, that are neutral for a structural reason.
+//! Eigenvalues of equilibria that are neutral for a structural reason.
 //!
 //! **Idea.** In conservative and in reversible systems the eigenvalues come in pairs λ, -λ, and those of a stable equilibrium lie on the
 //! imaginary axis at all parameter values. The same holds for a single pair if the trace of its block vanishes
@@ -11,14 +11,11 @@
 //!   (2)  |λ_i + λ_j| ≤ ε L  if all eigenvalues form such pairs: near λ = 0 (1) is not met, since the sum has an error of
 //!        the size of the other entries of the matrix
 //!
-//!   (3)  |μ_i μ_j - 1| ≤ ε (1 + |μ_i| + |μ_j|) for pairs of all multipliers of a forced cycle, with their error ε
-//!
 //! A pair that crosses the imaginary axis obeys (1) within a relative distance ε of the crossing, and a step may end just
 //! there. Pairs are therefore called neutral only if they are so at another parameter value too.
 //!
 //! **Fails when** an eigenvalue is ill-conditioned, as near 1:1 resonance, where its error is about √ε.
 
-use crate::diagram::{Point, Solution};
 use num_complex::Complex64;
 
 /// Multiple of the machine precision, for each state, up to which the sum of two eigenvalues counts as rounding. For 4000
@@ -103,30 +100,6 @@ fn mirrored(spectrum: &[Complex64], rounding: f64) -> Option<Vec<[usize; 2]>> {
 
 fn largest(spectrum: &[Complex64]) -> f64 {
     spectrum.iter().map(|z| z.norm()).fold(0.0, f64::max)
-}
-
-/// All multipliers of a forced cycle in pairs with the product 1 (3), if they can be paired so: the system is
-/// conservative, and multipliers on the unit circle stay there. `error` is that of the multipliers.
-pub fn reciprocal(point: &Point, error: f64) -> Option<Vec<[usize; 2]>> {
-    /// Largest error with which products tell anything.
-    const KNOWN: f64 = 1e-3;
-    let Solution::Cycle(cycle) = &point.solution else { return None };
-    let z = &point.spectrum;
-    if cycle.forcing_periods == 0 || z.is_empty() || z.len() % 2 == 1 || error.is_nan() || error > KNOWN {
-        return None;
-    }
-    let mut rest: Vec<usize> = (0..z.len()).collect();
-    let mut found = Vec::with_capacity(z.len() / 2);
-    while let Some(i) = rest.pop() {
-        let off = |j: &usize| (z[i] * z[*j] - 1.0).norm() / (1.0 + z[i].norm() + z[*j].norm());
-        let place = (0..rest.len()).min_by(|a, b| off(&rest[*a]).total_cmp(&off(&rest[*b])))?;
-        let j = rest.remove(place);
-        if off(&j) > error {
-            return None;
-        }
-        found.push([i, j]);
-    }
-    Some(found)
 }
 
 #[cfg(test)]
