@@ -6,10 +6,11 @@
 
 use super::angles::{self, Rolled};
 use super::measure::response;
+use super::recognition::{Found, Nature};
 use super::settling::{First, Settled, Trial, settle_or_recognise};
 use super::{Candidate, Sampling, driven, iterated};
 use crate::contract::Verdict;
-use crate::diagram::{Motion, Response, Share};
+use crate::diagram::{Motion, Recognition, Response, Share};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -76,11 +77,16 @@ pub fn survey_by_simulation(
                 .take_while(|_| !trial.field.ended())
                 .flat_map(|block| settle_or_recognise(trial, &own, block, First::Rough))
                 .collect();
-            let counted = |(number, settled): (usize, &Settled)| Response {
-                share: share(number),
-                ..response(trial, &own, free, settled).0
+            let mut seen = Vec::new();
+            let counted = |(number, settled): (usize, Settled)| {
+                let settled = like_another(settled, &seen);
+                let found = response(trial, &own, free, &settled).0;
+                if matches!(found.motion, Motion::Chaos | Motion::Other) {
+                    seen.push((settled.extent, found.motion, found.recognition.clone()));
+                }
+                Response { share: share(number), ..found }
             };
-            let found = grouped(trial, settled.iter().enumerate().map(counted).collect());
+            let found = grouped(trial, settled.into_iter().enumerate().map(counted).collect());
             if report(&found) == Verdict::Stop {
                 stop.store(true, Ordering::Relaxed);
             }
@@ -93,6 +99,21 @@ pub fn survey_by_simulation(
     let mut done = done.into_inner().unwrap_or_default();
     done.sort_by_key(|(index, _)| *index);
     done.into_iter().flat_map(|(_, found)| found).collect()
+}
+
+/// Gives a motion that has not settled the type of one that was followed further at the same parameters, if their extents
+/// agree: recognition takes a hundred times as long as settling, and many starts lead to one chaotic attractor.
+fn like_another(settled: Settled, seen: &[(Vec<f64>, Motion, Recognition)]) -> Settled {
+    /// Largest difference of the extents, which fluctuate from record to record.
+    const ALIKE: f64 = 0.2;
+    if settled.motion != Motion::Other || settled.found.is_some() {
+        return settled;
+    }
+    let alike = |extent: &[f64]| extent.iter().zip(&settled.extent).all(|(a, b)| (a - b).abs() <= ALIKE * a.max(*b));
+    let Some((_, motion, evidence)) = seen.iter().find(|(extent, ..)| alike(extent)) else { return settled };
+    let nature = if *motion == Motion::Chaos { Nature::Chaos } else { Nature::Undecided };
+    let found = Found { nature, evidence: evidence.clone(), state: settled.state.clone() };
+    Settled { found: Some(Box::new(found)), ..settled }
 }
 
 /// Merges responses that agree into one, sorted by decreasing number of hits.

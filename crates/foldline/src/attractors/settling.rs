@@ -85,12 +85,20 @@ pub(super) fn settle_or_recognise(trial: &Trial, parameters: &[f64], starts: &[f
     if limits.steps <= 2 * EARLY {
         return together(starts, first, limits);
     }
+    /// Trajectories in a row that may be followed without an answer: the others at the same parameters are alike.
+    const FRUITLESS: usize = 2;
     let mut all = together(starts, first, Limits { steps: EARLY, ..limits });
+    let mut fruitless = 0;
     for own in all.iter_mut().filter(|own| own.motion == Motion::Other && !trial.field.ended()) {
+        if fruitless == FRUITLESS {
+            break;
+        }
         let found = recognise(trial, parameters, &own.state, true);
         // Chaos may be a transient.
+        fruitless += 1;
         if matches!(found.nature, Nature::Cycle(_) | Nature::Torus(_)) {
             own.found = Some(Box::new(found));
+            fruitless = 0;
         }
     }
     let open: Vec<usize> =
