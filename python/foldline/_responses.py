@@ -17,7 +17,19 @@ if TYPE_CHECKING:
     from ._diagram import Diagram
     from ._model import Model
 
-_NUMBERS = ("value", "period", "share", "share_low", "share_high", "settled_after", "error", "rotation", "rotation_error", "exponent", "exponent_error")
+_NUMBERS = (
+    "value",
+    "period",
+    "share",
+    "share_low",
+    "share_high",
+    "settled_after",
+    "error",
+    "rotation",
+    "rotation_error",
+    "exponent",
+    "exponent_error",
+)
 
 
 class Responses(Mapping[str, Any]):
