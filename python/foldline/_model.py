@@ -142,7 +142,7 @@ class Model:
             The solution sought, or a start.
 
             * ``"equilibrium"``: the equilibrium of smallest norm. ``"cycle"``: the cycle that most initial states reach. ``"2:1"``: the
-              cycle with this spectral ratio of its whirling motion.
+              cycle with this spectral ratio of its whirling motion. ``"torus"``: a quasi-periodic motion, as a torus.
             * A state: ``{"x": 2, "y": 0}`` or ``[2, 0]``, one number for each state in its unit. An equilibrium near it is taken; if there is
               none, the attractor to which the trajectory from there settles.
             * A `Trajectory`, or what `scipy.integrate.solve_ivp` returned: begins at its last state. With a forced model, that state is

@@ -177,7 +177,7 @@ def test_messages_about_wrong_arguments_give_the_remedy(brusselator):
     with pytest.raises(foldline.InputError, match="has no state `z`"):
         brusselator.settle({"z": 3})
     with pytest.raises(foldline.InputError, match="is not an attractor"):
-        brusselator.settle("torus")
+        brusselator.settle("spiral")
     with pytest.raises(foldline.NoSolution, match="no stable cycle was found"):
         brusselator.settle("cycle")
     with pytest.raises(foldline.InputError, match="the wrong way round"):

@@ -247,7 +247,7 @@ impl Follow<'_> {
             let (ends, at) = ([&left.point, &right.point], &found.station.point);
             let around = Around { ends, at, length: stretch.length, error: found.error };
             let null = around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 });
-            if change <= null && (null - change) % 2 == 0 {
+            if change <= null && (null - change).is_multiple_of(2) {
                 jumps[0] = change;
             }
         }

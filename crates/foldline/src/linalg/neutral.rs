@@ -114,7 +114,8 @@ mod tests {
     fn pairs_on_the_axis_to_rounding_are_neutral_and_a_slow_pair_beside_a_fast_state_is_not() {
         let small = rounding(4, 0.0);
         let unstable = |z: &[Complex64]| z.iter().filter(|z| z.re > 0.0).count();
-        let cases: [(&[(f64, f64)], usize, usize); 5] = [
+        type Case<'c> = (&'c [(f64, f64)], usize, usize);
+        let cases: [Case; 5] = [
             (&[(1e-16, 2.0), (1e-16, -2.0), (1e-16, 1e-6), (1e-16, -1e-6)], 2, 0),
             (&[(1e-16, 2.0), (1e-16, -2.0), (1e-6, 0.0), (-1e-6 + 1e-16, 0.0)], 2, 1),
             (&[(-1e12, 0.0), (1e-3, 1.0), (1e-3, -1.0), (-1.0, 0.0)], 0, 2),
