@@ -165,7 +165,8 @@ fn cycles_with_impacts_are_verified() {
         assert_eq!(right.wrong().count(), 0, "{:?}", right.wrong().next());
         // The fold and the impact grazing are located again.
         assert!(right.points == 6 && right.special == 2, "{} {} {:?}", right.points, right.special, right.undecided);
-        let changes: [(Quantity, fn(&mut Point)); 4] = [
+        type Change = (Quantity, fn(&mut Point));
+        let changes: [Change; 4] = [
             (Quantity::Spectrum, |point| point.spectrum[0] += 1e-6),
             (Quantity::Range, |point| point.ranges[0][0] += 1e-6),
             (Quantity::Profile, |point| {

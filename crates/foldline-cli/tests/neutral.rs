@@ -241,7 +241,8 @@ fn run(case: &Case, tolerance: &str) -> Result<(), String> {
             (text("kind"), text(free).parse().unwrap(), [count("unstable_before"), count("unstable_after")])
         })
         .collect();
-    let same = |(own, right): (&(String, f64, [i64; 2]), &(&str, f64, [i64; 2]))| {
+    type Row<Name> = (Name, f64, [i64; 2]);
+    let same = |(own, right): (&Row<String>, &Row<&str>)| {
         let reverse = [right.2[1], right.2[0]];
         own.0 == right.0
             && (own.2 == right.2 || own.2 == reverse)
