@@ -30,7 +30,7 @@ const ACCURACY: f64 = 1e-10;
 /// degree, and what is known of it.
 ///
 /// # Errors
-/// What the samples led to instead.
+/// Outcome of the samples instead.
 pub fn first_torus(
     field: &dyn VectorField,
     parameters: &[f64],
