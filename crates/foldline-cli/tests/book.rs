@@ -2,12 +2,10 @@
 //! the program.
 //!
 //! On these pages each TOML block begins with the name of its file, and each `console` block holds commands and their
-//! output. After an intended change, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews outputs and
+//! output. After an intended change, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test all book::` renews outputs and
 //! pictures.
 
-mod pages;
-
-use pages::{Page, check_all, desk, keys, root, same};
+use crate::pages::{Page, check_all, desk, keys, root, same};
 use std::path::{Path, PathBuf};
 
 /// Opens a page of the book. The files that it shows are placed beside the folder of models.
@@ -64,7 +62,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
     assert!(
         renew || wrong.is_empty(),
         "where these changes are meant, renew them with\n  \
-         FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book\n{}",
+         FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test all book::\n{}",
         wrong.join("\n\n")
     );
 }

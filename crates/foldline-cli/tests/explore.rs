@@ -195,7 +195,7 @@ fn attracts(study: &Study, branch: &Branch) {
         let (source, parameters) = (SeedSource::State(state), point.parameters.clone());
         let seed = SeedPlan { name: "off".into(), source, parameters, samples: 1, random: 1 };
         let settled = first_solution(&system, &seed, 1e-6, 1);
-        settled.is_ok_and(|settled| settled.difference(point, system.measure(), &[]) < 1e-5)
+        settled.is_ok_and(|settled| settled.distance(point, system.measure()) < 1e-5)
     };
     let mut stable = branch.points.iter().filter(|point| point.unstable == 0);
     assert!(stable.any(|point| returns(&point)), "no trajectory settles on {}", branch.name);

@@ -2,9 +2,7 @@
 //!
 //! `cargo xtask gallery` renews tables, pictures and run times.
 
-mod pages;
-
-use pages::{Page, check_all, copy, desk, keys, root};
+use crate::pages::{Page, check_all, copy, desk, keys, root};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;

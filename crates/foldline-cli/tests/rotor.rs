@@ -104,7 +104,7 @@ fn the_work_matches_the_reference_table() {
     assert!(
         found == known,
         "the work has changed; where that is meant, renew the table with\n  \
-         FOLDLINE_WRITE_COUNTERS=1 cargo test -p foldline-cli --test rotor the_work\nknown:\n{known}\nfound:\n{found}"
+         FOLDLINE_WRITE_COUNTERS=1 cargo test -p foldline-cli --test all the_work\nknown:\n{known}\nfound:\n{found}"
     );
 }
 

@@ -1,8 +1,6 @@
 //! A run is shown while it grows, and its file is left unchanged.
 
-mod common;
-
-use common::{PATIENCE, Served, run_in, study};
+use crate::common::{PATIENCE, Served, run_in, study};
 use foldline::contract::{Event, Observer};
 use foldline::diagram::{Branch, Diagram, Ending};
 use foldline_store::run_file::{Part, Recorder, is_written, load_part};

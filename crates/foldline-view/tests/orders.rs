@@ -1,8 +1,6 @@
 //! Requests that change something: those that the page sends, and those that must be refused.
 
-mod common;
-
-use common::{MODEL, STUDY, Served, run_in, split};
+use crate::common::{MODEL, STUDY, Served, run_in, split};
 use foldline_store::run_file::{Part, load_part};
 use foldline_view::{Desk, Files, Watch};
 use serde_json::{Value, json};

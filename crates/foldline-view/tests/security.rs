@@ -1,8 +1,6 @@
 //! The server answers only the page that it has served itself, and survives every other request.
 
-mod common;
-
-use common::{PATIENCE, Served, run_in, split};
+use crate::common::{PATIENCE, Served, run_in, split};
 use std::io::{ErrorKind, Read, Write};
 use std::time::Instant;
 

@@ -3,7 +3,7 @@
 //! **Idea.** The rest of the crate is written against these few object-safe traits. A model may therefore be text,
 //! traced code or native Rust, and a curve may consist of equilibria, cycles or solutions of a new kind of problem.
 
-use crate::diagram::{Branch, Cycle, Design, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
+use crate::diagram::{Branch, Cycle, Design, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Symmetry, Trust};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.
@@ -422,15 +422,13 @@ pub trait ZeroProblem {
     /// The unknowns of a point. The current mesh must be that of the point.
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64>;
 
-    /// Copies (unknowns and tangent) of a point under `reflection` (state i negated where it is true) and, for a
+    /// Copies (unknowns and tangent) of a point under `symmetry` and, for a
     /// solution with free phase, under all phase shifts that bring it close to `beside`. They are on the current mesh,
     /// as is `beside`. Empty if no copy is within `within` of `beside`, or if the point does not belong to this
     /// problem.
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
         let mut seen = [self.unknowns_of(point), point.tangent.clone()];
-        for (i, _) in reflection.iter().enumerate().filter(|(_, negated)| **negated) {
-            seen.iter_mut().filter_map(|v| v.get_mut(i)).for_each(|v| *v = -*v);
-        }
+        seen.iter_mut().filter_map(|v| v.get_mut(..symmetry.dim())).for_each(|x| symmetry.apply(x));
         if seen.iter().any(|v| v.len() != beside.len()) {
             return Vec::new();
         }

@@ -6,7 +6,7 @@ use super::inspect::Found;
 use super::locate::{Stretch, passing};
 use super::step::Step;
 use crate::contract::Monitor;
-use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
+use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint, Symmetry};
 
 /// Share of the deviation from simpler solutions below which a step is rejected: it may have landed on them, and its
 /// side of the meeting point is uncertain.
@@ -26,7 +26,7 @@ const DIVISIBLE: f64 = 1e-3;
 pub struct Homecoming {
     /// True once the run has left the start.
     away: bool,
-    /// Largest distance from the start so far, for every reflection of it, and whether the distance has decreased
+    /// Largest distance from the start so far, for every image of it under a symmetry, and whether the distance has decreased
     /// since.
     reached: Vec<(f64, bool)>,
 }
@@ -275,14 +275,14 @@ impl Follow<'_> {
     /// called for every point in the order of travel.
     pub fn leaves_home(&mut self, here: &Point) {
         let Some(home) = self.home else { return };
-        let own = self.features(home, home, &[]);
+        let own = self.features(home, home, &Symmetry::identity());
         if self.homecoming.reached.is_empty() {
-            let seen = |reflection: &Vec<bool>| (distance(&self.features(home, home, reflection), &own), false);
-            self.homecoming.reached = self.settings.reflections.iter().map(seen).collect();
+            let seen = |symmetry: &Symmetry| (distance(&self.features(home, home, symmetry), &own), false);
+            self.homecoming.reached = self.settings.symmetries.iter().map(seen).collect();
         }
         let mut reached = std::mem::take(&mut self.homecoming.reached);
-        for ((farthest, nearer), reflection) in reached.iter_mut().zip(&self.settings.reflections) {
-            let off = distance(&self.features(here, home, reflection), &own);
+        for ((farthest, nearer), symmetry) in reached.iter_mut().zip(&self.settings.symmetries) {
+            let off = distance(&self.features(here, home, symmetry), &own);
             *nearer |= off < *farthest;
             *farthest = farthest.max(off);
         }
@@ -330,14 +330,14 @@ impl Follow<'_> {
         let value = home.parameters[self.free];
         let between = (self.value(left) - value) * (self.value(right) - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
-        let near = |r: &Vec<bool>| right.point.difference(home, self.settings.measure(), r) < 0.5;
-        if !(between && same_way && self.settings.reflections.iter().any(near)) {
+        let near = |r: &Symmetry| right.point.difference(home, self.settings.measure(), r) < 0.5;
+        if !(between && same_way && self.settings.symmetries.iter().any(near)) {
             return Ok(None);
         }
         let back = self.at_parameter(left, right, value, cost)?;
         let far = 10.0 * HOME * self.settings.tolerance;
-        for reflection in self.settings.reflections.clone() {
-            let images = self.images_of_home(&back, home, &reflection, far);
+        for symmetry in self.settings.symmetries.clone() {
+            let images = self.images_of_home(&back, home, &symmetry, far);
             if images.iter().any(|image| self.is_home(&back, home, image)) {
                 return Ok(Some(back));
             }
@@ -349,9 +349,9 @@ impl Follow<'_> {
     /// parameter value, and a step round the fold need not reach that value at all.
     fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
         let tolerance = self.settings.tolerance;
-        let own = self.features(home, home, &[]);
-        for (k, reflection) in self.settings.reflections.clone().into_iter().enumerate() {
-            let [from, to] = [left, right].map(|station| self.features(&station.point, home, &reflection));
+        let own = self.features(home, home, &Symmetry::identity());
+        for (k, symmetry) in self.settings.symmetries.clone().into_iter().enumerate() {
+            let [from, to] = [left, right].map(|station| self.features(&station.point, home, &symmetry));
             // A branch that has only moved away from this copy so far, and does so on this step, returns on a later
             // one.
             let receding =
@@ -365,8 +365,8 @@ impl Follow<'_> {
                 continue;
             }
             let length = self.between(left, right).along;
-            for image in self.images_of_home(right, home, &reflection, 1.5 * length + HOME * tolerance) {
-                if let Some(found) = self.crosses_at(left, right, home, &reflection, &image, cost) {
+            for image in self.images_of_home(right, home, &symmetry, 1.5 * length + HOME * tolerance) {
+                if let Some(found) = self.crosses_at(left, right, home, &symmetry, &image, cost) {
                     return Some(found);
                 }
             }
@@ -374,13 +374,13 @@ impl Follow<'_> {
         None
     }
 
-    /// Closure for one reflection and one copy of the start, seen from `right`.
+    /// Closure for one symmetry and one copy of the start, seen from `right`.
     fn crosses_at(
         &mut self,
         left: &Station,
         right: &Station,
         home: &Point,
-        reflection: &[bool],
+        symmetry: &Symmetry,
         image: &Image,
         cost: &mut Cost,
     ) -> Option<Station> {
@@ -415,7 +415,7 @@ impl Follow<'_> {
         }
         let found = self.cut(left, &stretch, there, cost)?;
         // In the phase of the end of the step the copy is slightly shifted in time, by more than is permitted here.
-        let images = self.images_of_home(&found, home, reflection, 10.0 * HOME * tolerance);
+        let images = self.images_of_home(&found, home, symmetry, 10.0 * HOME * tolerance);
         if !images.iter().any(|image| self.is_home(&found, home, image)) {
             return None;
         }
@@ -436,9 +436,9 @@ impl Follow<'_> {
     }
 
     /// Copies of the start no farther than `within` from a station.
-    fn images_of_home(&mut self, from: &Station, home: &Point, reflection: &[bool], within: f64) -> Vec<Image> {
+    fn images_of_home(&mut self, from: &Station, home: &Point, symmetry: &Symmetry, within: f64) -> Vec<Image> {
         self.place(from);
-        let images = self.problem.images(&from.u, home, reflection, within);
+        let images = self.problem.images(&from.u, home, symmetry, within);
         images.into_iter().map(|[u, tangent]| Image { u, tangent, mesh: from.mesh.clone() }).collect()
     }
 
@@ -476,16 +476,16 @@ impl Follow<'_> {
         Some(special)
     }
 
-    /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the reflection
+    /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the symmetry
     /// applied to it.
-    fn features(&self, point: &Point, home: &Point, seen: &[bool]) -> Vec<f64> {
+    fn features(&self, point: &Point, home: &Point, seen: &Symmetry) -> Vec<f64> {
         let value = |p: &Point| p.parameters.get(self.free).copied().unwrap_or(0.0);
         let mut all = vec![value(point) / (self.problem.unit() + value(home).abs())];
         if let Some(period) = point.solution.period() {
             all.push(period.ln());
         }
-        for (i, (range, at_home)) in point.ranges.iter().zip(&home.ranges).enumerate() {
-            let range = if seen.get(i).copied().unwrap_or(false) { [-range[1], -range[0]] } else { *range };
+        for (i, at_home) in home.ranges.iter().take(point.ranges.len()).enumerate() {
+            let range = seen.range(&point.ranges, i);
             let size = at_home[0].abs().max(at_home[1].abs());
             let scale = self.settings.scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
             all.extend(range.map(|v| v / scale));

@@ -54,6 +54,9 @@ const SYMMETRIC: f64 = 3e-3;
 /// Share of a step within which a linearly extrapolated monitor must change sign to be suspected of touching zero.
 const WELL: f64 = 0.75;
 
+/// Least share of a step that a cut where a monitor may touch zero leaves on either side.
+const BESIDE: f64 = 0.05;
+
 /// Values of all monitors at the point before an interval, for the test for tangency.
 #[derive(Clone, Debug)]
 pub struct History {
@@ -93,7 +96,9 @@ impl Follow<'_> {
         if left.mesh.is_empty() {
             return if slope < STANDS { FoldTest::None } else { FoldTest::Slope };
         }
-        let family = stands && left.point.is_one_of_family() || right.point.is_one_of_family();
+        // An error beyond the distance from 0 to 1 says nothing about a family that is only entered.
+        let entered = right.point.is_one_of_family() && right.point.neutral_error() < 1.0;
+        let family = stands && (left.point.is_one_of_family() || right.point.is_one_of_family()) || entered;
         if certain && slope * length.min(1.0) < unseen || family {
             return FoldTest::None;
         }
@@ -165,7 +170,7 @@ impl Follow<'_> {
                 // otherwise the step has cut across to another branch.
                 if kind == Kind::Fold
                     && left.point.unstable == right.point.unstable
-                    && self.settings.reflections.len() < 2
+                    && self.settings.symmetries.len() < 2
                 {
                     found = Err(Failure::Unexplained);
                 }
@@ -181,9 +186,9 @@ impl Follow<'_> {
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
                 && found.as_ref().is_ok_and(|found| {
-                    // With reflections, symmetry decides; a fold next to a branch point looks like a vertex from afar.
+                    // In a symmetric model the symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
-                        || self.settings.reflections.len() < 2 && self.is_vertex(&stretch, found.distance, cost)
+                        || self.settings.symmetries.len() < 2 && self.is_vertex(&stretch, found.distance, cost)
                 })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
@@ -270,12 +275,11 @@ impl Follow<'_> {
         // Along bifurcation curves monitors may jump as well. But if the count changes along with a monitor that could
         // not be located, the meshes of the two ends disagree about the position; closer together they agree.
         let misplaced = !self.settings.stability && lost && jumps.is_empty() && change > 0;
-        let touches = || {
-            history.is_some_and(|h| {
-                self.may_touch(h, &at_left, &at_right, stretch.length) || may_double(h, left, right, stretch.length)
-            })
-        };
-        let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
+        let touched = history.filter(|_| depth < 3).and_then(|h| {
+            let doubled = || may_double(h, left, right, stretch.length).then_some(0.5 * stretch.length);
+            self.touched(h, &at_left, &at_right, stretch.length).or_else(doubled)
+        });
+        let suspicious = touched.is_some() || depth < 3 && !standing && stretch.may_turn_twice();
         // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
         let mut seen = cut_there;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
@@ -295,7 +299,7 @@ impl Follow<'_> {
         {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
-                _ => misfit.or(cut_there).or(seen).unwrap_or(0.5 * stretch.length),
+                _ => misfit.or(cut_there).or(seen).or(touched).unwrap_or(0.5 * stretch.length),
             };
             // Neighbouring special points that can no longer be told apart stay together.
             let together = if short { CLOSEST } else { 1e-7 * (1.0 + stretch.length) };
@@ -398,9 +402,9 @@ impl Follow<'_> {
     fn is_vertex(&mut self, stretch: &Stretch, there: f64, cost: &mut Cost) -> bool {
         /// Distance of the comparison points, as a share of the step. Empirical: far enough for the eigenvalue to
         /// exceed its error, near enough to exclude other events.
-        const BESIDE: f64 = 0.05;
+        const CLOSE_BY: f64 = 0.05;
         let room = there.abs().min((stretch.length - there).abs());
-        let beside = (BESIDE * stretch.length.abs()).min(0.5 * room);
+        let beside = (CLOSE_BY * stretch.length.abs()).min(0.5 * room);
         let mut count = |s: f64| Some(stretch.at(self.problem, self.settings, s, cost).ok()?.point.unstable);
         count(there - beside).is_some_and(|before| count(there + beside) == Some(before))
     }
@@ -504,9 +508,9 @@ impl Follow<'_> {
         kinds.map(|(kind, a, b)| Found::Special(self.special(kind, there.clone(), a, b, error))).into()
     }
 
-    /// True if a reflection of the model maps the solution to itself, possibly with a phase shift.
+    /// True if a symmetry of the model maps the solution to itself, possibly with a phase shift.
     fn is_symmetric(&self, at: &Point) -> bool {
-        let mut images = self.settings.reflections.iter().filter(|r| r.contains(&true));
+        let mut images = self.settings.symmetries.iter().filter(|r| !r.is_identity());
         images.any(|r| at.difference(at, self.settings.measure(), r) < SYMMETRIC)
     }
 
@@ -549,13 +553,12 @@ impl Follow<'_> {
     /// image: the ranges of `at` are symmetric and those of both ends are less so. Along a branch of symmetric
     /// solutions all three are symmetric.
     fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
-        let images = || self.settings.reflections.iter().filter(|r| r.contains(&true));
-        let asymmetry = |point: &Point| {
-            images().map(|r| point.difference(point, self.settings.measure(), r)).fold(f64::INFINITY, f64::min)
-        };
-        let here = asymmetry(at);
-        let least = 2.0 * here.max(self.settings.tolerance);
-        here < SYMMETRIC && ends.iter().all(|end| asymmetry(&end.point) > least)
+        let (measure, tolerance) = (self.settings.measure(), self.settings.tolerance);
+        self.settings.symmetries.iter().filter(|r| !r.is_identity()).any(|r| {
+            let here = at.difference(at, measure, r);
+            let least = 2.0 * here.max(tolerance);
+            here < SYMMETRIC && ends.iter().all(|end| end.point.difference(&end.point, measure, r) > least)
+        })
     }
 
     fn either_confirms(&self, monitor: usize, left: &Station, right: &Station) -> bool {
@@ -669,9 +672,8 @@ impl Follow<'_> {
                     spectrum: Vec::new(),
                     stands: false,
                 };
-                let touches = self.may_touch(&from(at_left), &here, at_right, half)
-                    || self.may_touch(&from(at_right), &here, at_left, half);
-                if !touches {
+                let beside = [(at_left, at_right), (at_right, at_left)];
+                if beside.iter().all(|(before, after)| self.touched(&from(before), &here, after, half).is_none()) {
                     return None;
                 }
             }
@@ -706,23 +708,24 @@ impl Follow<'_> {
         now + WELL * length * (now - before) / history.distance < 0.0 && then > WELL * now
     }
 
-    /// True if some monitor may have crossed zero and returned between the last two of three values: the parabola
-    /// through them comes close to zero, or the line through the first two changes sign well before the last.
-    fn may_touch(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> bool {
-        (0..left.len()).any(|k| {
+    /// Place between the last two of three values at which some monitor may have crossed zero before it returned: where
+    /// the parabola through the values is close to zero or beyond it, or the middle if the line through the first two
+    /// changes sign well before the last. `None` if every monitor stays clear of zero.
+    fn touched(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> Option<f64> {
+        (0..left.len()).find_map(|k| {
             let (a, b, c) = (history.values[k], left[k], right[k]);
             if self.monitors[k].kind() == Kind::BranchPoint || a * b <= 0.0 || b * c <= 0.0 {
-                return false;
+                return None;
             }
             let (before, after) = ((b - a) / history.distance, (c - b) / length);
-            if (b + WELL * length * before) * b < 0.0 {
-                return true;
-            }
             let bend = (after - before) / (history.distance + length);
             let slope = after - bend * length;
             let at = -slope / (2.0 * bend);
             let value = b + at * (slope + bend * at);
-            bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
+            if bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1 {
+                return Some(at.clamp(BESIDE * length, (1.0 - BESIDE) * length));
+            }
+            ((b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
         })
     }
 }

@@ -34,7 +34,7 @@ mod side;
 mod step;
 pub mod straddle;
 
-use crate::diagram::Measure;
+use crate::diagram::{Measure, Symmetry};
 pub use corrector::{Failure, Station};
 pub(crate) use diagnosis::UNCROSSED;
 pub use ends::Homecoming;
@@ -72,9 +72,9 @@ pub struct Settings {
     pub period_growth: f64,
     /// Maximum number of Newton iterations in a step.
     pub max_newton: usize,
-    /// Coordinate reflections under which the model is equivariant, the identity first; see
+    /// Symmetries of the model, the identity first; see
     /// [`crate::diagram::Point::difference`].
-    pub reflections: Vec<Vec<bool>>,
+    pub symmetries: Vec<Symmetry>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
     /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
@@ -104,7 +104,7 @@ impl Settings {
             min_step: 1e-9,
             period_growth: 1e3,
             max_newton: 8,
-            reflections: vec![vec![false; scales.len()]],
+            symmetries: vec![Symmetry::identity()],
             scales: scales.to_vec(),
             periods: Vec::new(),
             kinks: 0,

@@ -7,6 +7,7 @@ mod number;
 mod record;
 mod response;
 mod share;
+mod symmetry;
 mod torus;
 
 pub use cycle::Cycle;
@@ -15,6 +16,7 @@ pub use number::Shown;
 pub use record::{Misfit, Record};
 pub use response::{Motion, Recognition, Response, Responses, Search};
 pub use share::Share;
+pub use symmetry::Symmetry;
 pub use torus::Torus;
 
 use num_complex::Complex64;
@@ -67,12 +69,13 @@ impl Solution {
         self.gain().get(state).map_or(0, |gain| (gain / period).round() as i64)
     }
 
-    /// True if angles turn as often as those of `other`, some of whose states are `mirrored`.
-    fn turns_like(&self, other: &Solution, mirrored: &dyn Fn(usize) -> bool) -> bool {
+    /// True if angles turn as often as those of the image of `other` under a symmetry.
+    fn turns_like(&self, other: &Solution, symmetry: &Symmetry) -> bool {
         let (own, theirs) = (self.gain(), other.gain());
         let of = |gain: &[f64], i: usize| gain.get(i).copied().unwrap_or(0.0);
         (0..own.len().max(theirs.len())).all(|i| {
-            let theirs = if mirrored(i) { -of(theirs, i) } else { of(theirs, i) };
+            let (from, negated) = symmetry.image(i);
+            let theirs = if negated { -of(theirs, from) } else { of(theirs, from) };
             (of(own, i) - theirs).abs() <= 1e-9 * theirs.abs()
         })
     }
@@ -264,12 +267,11 @@ impl Point {
 
     /// Returns the largest difference between two points in their periods, relative to the period, and in the ranges of
     /// their states, relative to scale plus size. Outputs do not count: they follow from the states, and one that is a
-    /// small difference (the force of a contact that has just begun) is less accurate than they are. `reflection[i]`
-    /// negates state i of the other point. Infinite between an equilibrium and a cycle, or if angles turn differently.
-    pub fn difference(&self, other: &Point, measure: Measure, reflection: &[bool]) -> f64 {
+    /// small difference (the force of a contact that has just begun) is less accurate than they are. The other point is seen
+    /// under `symmetry`. Infinite between an equilibrium and a cycle, or if angles turn differently.
+    pub fn difference(&self, other: &Point, measure: Measure, symmetry: &Symmetry) -> f64 {
         let Measure { scales, periods } = measure;
-        let mirrored = |i: usize| reflection.get(i).copied().unwrap_or(false);
-        if !self.solution.turns_like(&other.solution, &mirrored) {
+        if !self.solution.turns_like(&other.solution, symmetry) {
             return f64::INFINITY;
         }
         let mut largest: f64 = match (self.solution.period(), other.solution.period()) {
@@ -277,8 +279,8 @@ impl Point {
             (None, None) => 0.0,
             _ => return f64::INFINITY,
         };
-        for (i, ((a, b), scale)) in self.ranges.iter().zip(&other.ranges).zip(scales).enumerate() {
-            let mut b = if mirrored(i) { [-b[1], -b[0]] } else { *b };
+        for (i, (a, scale)) in self.ranges.iter().take(other.ranges.len()).zip(scales).enumerate() {
+            let mut b = symmetry.range(&other.ranges, i);
             if let Some(period) = periods.get(i).filter(|period| period.is_finite()) {
                 let copies = period * (0.5 * (a[0] + a[1] - b[0] - b[1]) / period).round();
                 b = b.map(|b| b + copies);
@@ -288,6 +290,11 @@ impl Point {
             largest = largest.max((a[0] - b[0]).abs() / scale).max((a[1] - b[1]).abs() / scale);
         }
         largest
+    }
+
+    /// Returns [`Point::difference`] from the other point as it is.
+    pub fn distance(&self, other: &Point, measure: Measure) -> f64 {
+        self.difference(other, measure, &Symmetry::identity())
     }
 
     /// Drops the profile and mesh of a cycle and the tangent, which make up nearly all of a point.

@@ -58,7 +58,7 @@ fn ends_in_doubling(system: &System, branch: &Branch, special: &SpecialPoint, me
     let edges = [points.first().zip(points.get(1)), points.last().zip(points.iter().nth_back(1))];
     branch.ends.iter().zip(edges).any(|(end, edge)| {
         let (Some(end), Some((last, before))) = (end, edge) else { return false };
-        let close = 1e-3 + 1.5 * last.difference(before, system.measure(), &[]);
-        met(end) && system.reflections.iter().any(|r| last.difference(&twice, system.measure(), r) < close)
+        let close = 1e-3 + 1.5 * last.distance(before, system.measure());
+        met(end) && system.symmetries.iter().any(|r| last.difference(&twice, system.measure(), r) < close)
     })
 }

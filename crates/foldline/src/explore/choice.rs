@@ -4,7 +4,7 @@ use super::System;
 use super::diagnosis::{Seen, of_no_start};
 use super::plan::{AttractorKey, SeedPlan};
 use crate::attractors::{Attractor, Census, whirl_sense};
-use crate::diagram::{Point, Solution};
+use crate::diagram::{Point, Solution, Symmetry};
 
 /// True if a solution is of the type that a key names.
 pub(super) fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
@@ -41,8 +41,8 @@ impl<'c> Choice<'c> {
         for attractor in fitting {
             let image = |other: &&Attractor| {
                 let close =
-                    |r: &Vec<bool>| attractor.point.difference(&other.point, system.measure(), r) < 30.0 * tolerance;
-                system.reflections.iter().any(close)
+                    |r: &Symmetry| attractor.point.difference(&other.point, system.measure(), r) < 30.0 * tolerance;
+                system.symmetries.iter().any(close)
             };
             if !meant.iter().any(image) {
                 meant.push(attractor);

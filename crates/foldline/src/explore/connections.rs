@@ -14,7 +14,7 @@ use super::shooting::Search;
 use crate::continuation::corrector::parameter_row;
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
-use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution};
+use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution, Symmetry};
 use crate::linalg::{lu, max_abs};
 use crate::problem::connecting::longer::sampled;
 use crate::problem::connecting::{ConnectingField, Split};
@@ -130,7 +130,6 @@ impl<'s> Start<'s> {
     where
         's: 'o,
     {
-        let n = self.field.dim();
         let mut parameter_scales = system.parameter_scales.clone();
         parameter_scales.resize(system.field.parameter_count(), 1.0);
         parameter_scales.push(self.field.time_unit(&self.point.parameters));
@@ -141,7 +140,7 @@ impl<'s> Start<'s> {
         System {
             field: &self.field,
             parameter_scales,
-            reflections: vec![vec![false; n]],
+            symmetries: vec![Symmetry::identity()],
             mirrors: Vec::new(),
             holds: None,
             unfolded: None,

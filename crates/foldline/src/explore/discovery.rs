@@ -230,7 +230,7 @@ impl Discovery<'_, '_> {
         let (system, free, [low, high]) = (self.work.system, self.plan.free, self.plan.range);
         let [p, q] = [a, b].map(|point| point.parameters[free]);
         (p - q).abs() <= NEAR * (high - low)
-            && system.reflections.iter().any(|r| a.difference(b, system.measure(), r) < NEAR.sqrt())
+            && system.symmetries.iter().any(|r| a.difference(b, system.measure(), r) < NEAR.sqrt())
     }
 
     /// Follows a new branch from a fold that a curve has met.

@@ -205,7 +205,7 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
     let usual = Settings::new(tolerance, range, &system.scales);
     let periods = system.field.periods().to_vec();
     Settings {
-        reflections: system.reflections.clone(),
+        symmetries: system.symmetries.clone(),
         periods,
         max_points,
         kinks: system.field.switch_count() - system.field.event_count(),
@@ -1114,16 +1114,16 @@ pub fn is_doubled(branch: &Branch) -> bool {
 fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + 'a>> {
     let mut all: Vec<Box<dyn Monitor + 'a>> = Vec::new();
     if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
-        for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
+        for symmetry in system.symmetries.iter().filter(|r| !r.is_identity()) {
             let forced = system.field.forced();
             for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
                 // Half of an odd number of forcing periods shifts the forcing by half its period.
                 let odd = branch.points.first().is_some_and(|p| p.solution.forcing_periods() % 2 == 1);
-                if forced && !system.mirrors_after(reflection, half && odd) {
+                if forced && !system.mirrors_after(symmetry, half && odd) {
                     continue;
                 }
                 all.push(Box::new(collapse::Mirrors {
-                    reflection: reflection.clone(),
+                    symmetry: symmetry.clone(),
                     scales: system.scales.clone(),
                     periods: system.field.periods().to_vec(),
                     half,

@@ -1,7 +1,7 @@
 //! Recognition of solutions that lie on a known branch.
 //!
 //! **Idea.** Two solutions at the same parameter values are the same if their periods and the ranges of all states
-//! agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies shifted by
+//! agree, up to a symmetry of the model. A cycle of a forced model and its copies shifted by
 //! forcing periods have the same ranges, and several turns of a shorter cycle count as that cycle (`minimal`). The
 //! solution of a known branch at the parameter value in question is interpolated first and, if that is close, computed
 //! by Newton's method.
@@ -160,9 +160,9 @@ pub fn branch_of<'b>(
             let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
             let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
             let nearest = if first { pair[0] } else { pair[1] };
-            let apart = pair[0].difference(pair[1], system.measure(), &[]);
+            let apart = pair[0].distance(pair[1], system.measure());
             let close = |other: &Point, tolerance: f64| {
-                system.reflections.iter().any(|r| point.difference(other, system.measure(), r) < tolerance)
+                system.symmetries.iter().any(|r| point.difference(other, system.measure(), r) < tolerance)
             };
             let turns = turns(nearest, point);
             if !close(&lasting(nearest, 1.0 / turns), 1e-3 + 1.5 * apart) {

@@ -198,7 +198,7 @@ impl<T> Slots<T> {
 /// True if two solutions at the same parameter values are the same, or images of each other under a symmetry.
 fn same(system: &System, tolerance: f64, a: &Point, b: &Point) -> bool {
     let close = 30.0 * tolerance;
-    system.reflections.iter().any(|reflection| a.difference(b, system.measure(), reflection) < close)
+    system.symmetries.iter().any(|symmetry| a.difference(b, system.measure(), symmetry) < close)
 }
 
 /// Position of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.

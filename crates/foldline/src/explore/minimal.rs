@@ -91,8 +91,7 @@ fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, 
     // Newton's method may have converged to another cycle.
     let same_period = (found.solution.period()? * turns as f64 - period).abs() <= 30.0 * settings.tolerance * period;
     let expected = Point { solution: found.solution.clone(), ..point.clone() };
-    let same =
-        same_period && found.difference(&expected, system.measure(), &[]) < 30.0 * settings.tolerance.max(allowed);
+    let same = same_period && found.distance(&expected, system.measure()) < 30.0 * settings.tolerance.max(allowed);
     same.then_some(Point { position: point.position, ..found })
 }
 

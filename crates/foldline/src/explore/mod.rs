@@ -44,6 +44,7 @@ mod design;
 mod diagnosis;
 mod direct;
 mod discovery;
+mod equivariance;
 pub mod family;
 pub mod given;
 pub mod growth;

@@ -76,7 +76,7 @@ fn exactly(system: &System, plan: &Plan, branch: &Branch, point: Point, value: f
     let mut guess = point.clone();
     guess.parameters[branch.free] = value;
     let mut problem = problem_of(system, branch.free, plan.degree, &guess, is_doubled(branch));
-    let apart = |a: &Point, b: &Point| a.difference(b, system.measure(), &[]);
+    let apart = |a: &Point, b: &Point| a.distance(b, system.measure());
     let neighbours = branch.points.iter().filter(|own| (own.position - point.position).abs() <= 1);
     let room = neighbours.map(|own| apart(own, &point)).filter(|room| room.is_finite()).fold(0.0, f64::max);
     let found = polished(&mut *problem, &settings, &guess).map_err(|why| why.to_string());

@@ -38,7 +38,7 @@ impl<'p> Pursuit<'p> {
         let before = std::mem::replace(&mut self.last, point);
         let (from, to) = before.as_ref().zip(self.last.as_ref())?;
         let reached = self.followed(from, to.parameters[self.free])?;
-        Some(reached.is_none_or(|reached| reached.difference(to, self.system.measure(), &[]) > 30.0 * self.tolerance))
+        Some(reached.is_none_or(|reached| reached.distance(to, self.system.measure()) > 30.0 * self.tolerance))
     }
 
     /// The solution continued to a value of the parameter: `Some(None)` if it turns back or joins another branch on the

@@ -403,7 +403,7 @@ pub(super) fn across(
     problem.set_mesh(&mesh);
     let symmetric =
         step_off_from(problem, settings, u, vector, -1.0, &distances, &|_, _| true, improved).is_ok_and(|other| {
-            let images = system.reflections.iter().filter(|r| r.contains(&true));
+            let images = system.symmetries.iter().filter(|r| !r.is_identity());
             let gap = (one.parameter() - other.parameter()).abs();
             gap < 1e-6 * (1.0 + one.parameter().abs())
                 && images

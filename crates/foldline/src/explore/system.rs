@@ -3,8 +3,8 @@
 use super::plan::{BranchPlan, ExplorePlan, Holds, Plan};
 use super::sizes;
 use crate::attractors::Limits;
-use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Diagram, Family, Measure, Shown, Solution};
+use crate::contract::VectorField;
+use crate::diagram::{Diagram, Family, Measure, Shown, Solution, Symmetry};
 use crate::model::Model;
 use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
@@ -29,9 +29,9 @@ pub struct System<'a> {
     pub limits: Limits,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,
-    /// Coordinate reflections under which the field is equivariant, the identity first; for a forced field also those
+    /// Symmetries of the field, the identity first; for a forced field also those
     /// under which it is equivariant half a forcing period later.
-    pub reflections: Vec<Vec<bool>>,
+    pub symmetries: Vec<Symmetry>,
     /// Quantities held along the branch that is followed, with the further free parameters.
     pub(super) holds: Option<&'a Holds>,
     /// Names of states and outputs, for messages.
@@ -59,7 +59,7 @@ impl<'a> System<'a> {
             ranges: vec![[-2.0, 2.0]; n],
             limits: Limits::default(),
             whirl: None,
-            reflections: vec![vec![false; n]],
+            symmetries: vec![Symmetry::identity()],
             holds: None,
             channel_names: Vec::new(),
             unfolded: None,
@@ -71,7 +71,7 @@ impl<'a> System<'a> {
     /// that it has there.
     pub fn of(model: &'a Model, parameters: &[f64]) -> System<'a> {
         let mut system = System::measured(model, &Plan::empty(1.0, 1), &[sizes::origin(model, parameters)]);
-        system.find_reflections(parameters);
+        system.find_symmetries(parameters);
         system
     }
 
@@ -102,13 +102,13 @@ impl<'a> System<'a> {
         let measured = System::measured(model, plan, &sizes::places(model, plan));
         let mut systems = places.iter().map(|place| {
             let mut there = measured.clone();
-            there.find_reflections(place);
+            there.find_symmetries(place);
             there
         });
         let Some(mut common) = systems.next() else { return measured };
         for other in systems {
-            let kept: Vec<bool> = common.reflections.iter().map(|own| other.reflections.contains(own)).collect();
-            common.reflections.retain(|reflection| other.reflections.contains(reflection));
+            let kept: Vec<bool> = common.symmetries.iter().map(|own| other.symmetries.contains(own)).collect();
+            common.symmetries.retain(|own| other.symmetries.contains(own));
             let mut kept = kept.into_iter();
             common.mirrors.retain(|_| kept.next().unwrap_or(true));
         }
@@ -235,91 +235,6 @@ impl<'a> System<'a> {
             }
         }
         Ok(())
-    }
-
-    /// True if a forced field is equivariant under one of [`System::reflections`]: at the same time, or half a forcing
-    /// period later if `half`.
-    pub fn mirrors_after(&self, reflection: &[bool], half: bool) -> bool {
-        let place = self.reflections.iter().position(|own| own == reflection);
-        place.and_then(|place| self.mirrors.get(place)).is_some_and(|mirrors| mirrors[usize::from(half)])
-    }
-
-    /// True if a reflection changes no more than the signs of the conditions of a boundary-value problem.
-    fn keeps_conditions(&self, reflection: &[bool], points: &[Vec<f64>], parameters: &[f64]) -> bool {
-        let ([ends, integrals], n) = (self.field.conditions(), self.field.dim());
-        let reflect =
-            |x: &[f64]| -> Vec<f64> { x.iter().zip(reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
-        let values = |left: &[f64], right: &[f64], time: f64| {
-            let [mut b, mut by_left, mut by_right] = [1, n, n].map(|size| vec![0.0; ends * size]);
-            self.field.boundary([left, right], parameters, &[], [&mut b, &mut by_left, &mut by_right, &mut []]);
-            let (mut g, mut gx) = (vec![0.0; integrals], vec![0.0; integrals * n]);
-            let (parameters, times) = (Parameters::Shared(parameters), &[time][..]);
-            let batch = Batch { lanes: 1, states: left, parameters, times, signs: &[] };
-            self.field.integrands(batch, &[], [&mut g, &mut gx, &mut []]);
-            b.extend(g);
-            b
-        };
-        let mut signs = vec![0.0; ends + integrals];
-        points.windows(2).enumerate().all(|(k, pair)| {
-            let time = 0.137 + 0.211 * k as f64;
-            let own = values(&pair[0], &pair[1], time);
-            let image = values(&reflect(&pair[0]), &reflect(&pair[1]), time);
-            own.iter().zip(&image).zip(&mut signs).all(|((a, b), sign)| {
-                let same = |sign: f64| (a - sign * b).abs() <= 1e-10 * (a.abs() + b.abs());
-                let fits = if *sign == 0.0 { [1.0, -1.0].into_iter().find(|s| same(*s)) } else { Some(*sign) };
-                *sign = fits.unwrap_or(0.0);
-                fits.is_some_and(same)
-            })
-        })
-    }
-
-    /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter
-    /// values `parameters`.
-    pub fn find_reflections(&mut self, parameters: &[f64]) {
-        let n = self.field.dim();
-        self.reflections = vec![vec![false; n]];
-        // Events need not be symmetric.
-        if n > 10 || self.field.event_count() > 0 {
-            return;
-        }
-        let points: Vec<Vec<f64>> = (0..5)
-            .map(|k| {
-                (0..n).map(|i| self.scales[i] * ((3 * k + 1) as f64 * 0.71 + (i * i + 1) as f64 * 1.37).sin()).collect()
-            })
-            .collect();
-        let forced = self.field.forced();
-        let value = |x: &[f64], time: f64| {
-            let (times, mut f) = ([time], vec![0.0; n]);
-            let (parameters, times) = (Parameters::Shared(parameters), if forced { &times[..] } else { &[] });
-            self.field.evaluate(Batch { lanes: 1, states: x, parameters, times, signs: &[] }, &mut f);
-            f
-        };
-        let equivariant = |reflection: &[bool], later: f64| {
-            let reflect =
-                |x: &[f64]| -> Vec<f64> { x.iter().zip(reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
-            points.iter().enumerate().all(|(k, x)| {
-                let time = 0.137 + 0.211 * k as f64;
-                let (a, b) = (value(&reflect(x), time + later), reflect(&value(x, time)));
-                let size = if forced { crate::linalg::max_abs(&b) } else { 0.0 };
-                a.iter().zip(&b).all(|(p, q)| p.is_finite() && (p - q).abs() <= 1e-10 * (p.abs() + q.abs() + size))
-            })
-        };
-        let mut mirrors = vec![[true, false]];
-        let mut found = Vec::new();
-        for bits in 1..1usize << n {
-            let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let later = forced && !self.field.iterated() && !self.is_open();
-            let holds = [
-                equivariant(&reflection, 0.0) && self.keeps_conditions(&reflection, &points, parameters),
-                later && equivariant(&reflection, 0.5),
-            ];
-            if holds.contains(&true) {
-                found.push(reflection);
-                mirrors.push(holds);
-            }
-        }
-        self.reflections.extend(found);
-        self.mirrors = mirrors;
     }
 }
 

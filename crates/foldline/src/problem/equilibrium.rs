@@ -6,7 +6,7 @@
 use super::Setting;
 use super::unfolding::Unfolding;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
-use crate::diagram::{Mesh, Point, Solution, Trust};
+use crate::diagram::{Mesh, Point, Solution, Symmetry, Trust};
 use crate::linalg::{axpy, dot, larger, lu, max_abs, neutral};
 use crate::problem::{averages, extremes};
 use crate::stability::eigenvalues;
@@ -221,15 +221,13 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         }
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
         let [mut u, mut tangent] = [self.unknowns_of(point), point.tangent.clone()];
         if [u.len(), tangent.len()] != [beside.len(); 2] {
             return Vec::new();
         }
-        for i in (0..self.n()).filter(|i| reflection.get(*i).copied().unwrap_or(false)) {
-            (u[i], tangent[i]) = (-u[i], -tangent[i]);
-        }
         let n = self.n();
+        [&mut u, &mut tangent].into_iter().for_each(|v| symmetry.apply(&mut v[..n]));
         self.setting.nearest_copy(&mut u[..n], &beside[..n]);
         let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
         if self.dot(&off, &off) <= within * within { vec![[u, tangent]] } else { Vec::new() }

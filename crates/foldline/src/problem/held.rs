@@ -22,7 +22,7 @@
 //! **Fails when** the surface itself is singular (two bifurcation curves cross).
 
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
-use crate::diagram::{Kind, Mesh, Point};
+use crate::diagram::{Kind, Mesh, Point, Symmetry};
 use crate::linalg::{axpy, lu};
 use num_complex::Complex64;
 
@@ -459,12 +459,12 @@ impl ZeroProblem for Held<'_> {
         self.surface.point(&u[self.extra()..], tangent, examination)
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
         let e = self.extra();
         let Some((extra, rest)) = point.tangent.split_at_checked(e) else { return Vec::new() };
         let below = Point { tangent: rest.to_vec(), ..point.clone() };
         let guess = self.condition.guess(point);
-        let images = self.surface.images(&beside[e..], &below, reflection, within);
+        let images = self.surface.images(&beside[e..], &below, symmetry, within);
         images.into_iter().map(|[u, along]| [[&guess[..], &u].concat(), [extra, &along].concat()]).collect()
     }
 

@@ -20,7 +20,7 @@
 
 use super::Setting;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
-use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::diagram::{Cycle, Mesh, Point, Solution, Symmetry, Trust};
 use crate::linalg::cyclic::{Cyclic, Parts};
 use crate::linalg::{dot, larger, max_abs, periodic_schur};
 use num_complex::Complex64;
@@ -307,15 +307,13 @@ impl ZeroProblem for MapProblem<'_> {
         }
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
         let [mut u, mut tangent] = [self.unknowns_of(point), point.tangent.clone()];
         if [u.len(), tangent.len()] != [beside.len(); 2] {
             return Vec::new();
         }
         let (n, size) = (self.n(), self.size());
-        for c in (0..size).filter(|c| reflection.get(c % n).copied().unwrap_or(false)) {
-            (u[c], tangent[c]) = (-u[c], -tangent[c]);
-        }
+        [&mut u, &mut tangent].into_iter().for_each(|v| symmetry.apply(&mut v[..size]));
         let mut found = Vec::new();
         for shift in 0..self.count {
             let mut copy = self.shifted(&u, shift, true);

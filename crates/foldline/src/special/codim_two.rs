@@ -159,6 +159,19 @@ impl CodimensionTwo<'_> {
     }
 }
 
+impl CodimensionTwo<'_> {
+    /// True if the eigenvalue 0 of an equilibrium is simple. ⟨p, B(q, q)⟩ also vanishes, with ⟨p, q⟩, where a fold and
+    /// a branch point meet at a double eigenvalue 0.
+    fn is_simple(&self, at: &Point) -> Option<bool> {
+        let [q, p] = Local::new(self.field, at)?.null_vectors()?;
+        // Norm in scaled components.
+        let norm = |v: &[f64], power: i32| {
+            v.iter().zip(self.scales).map(|(v, s)| (v * s.powi(power)).powi(2)).sum::<f64>().sqrt()
+        };
+        Some(dot(&p, &q).abs() > DOUBLE * norm(&q, -1) * norm(&p, 1))
+    }
+}
+
 impl Monitor for CodimensionTwo<'_> {
     fn kind(&self) -> Kind {
         self.kind
@@ -176,15 +189,7 @@ impl Monitor for CodimensionTwo<'_> {
             // Two real eigenvalues with zero sum are not on the axis.
             Kind::ZeroHopf if self.held != Kind::Hopf => rest.iter().any(on_axis),
             Kind::ZeroHopf | Kind::GeneralisedHopf => held.iter().all(on_axis),
-            // ⟨p, B(q, q)⟩ also vanishes, with ⟨p, q⟩, where a fold and a branch point meet at a double eigenvalue 0.
-            Kind::Cusp if at.solution.period().is_none() => {
-                let vectors = Local::new(self.field, at).and_then(|local| local.null_vectors());
-                // Norm in scaled components.
-                let norm = |v: &[f64], power: i32| {
-                    v.iter().zip(self.scales).map(|(v, s)| (v * s.powi(power)).powi(2)).sum::<f64>().sqrt()
-                };
-                vectors.is_some_and(|[q, p]| dot(&p, &q).abs() > DOUBLE * norm(&q, -1) * norm(&p, 1))
-            }
+            Kind::Cusp if at.solution.period().is_none() => self.is_simple(at) == Some(true),
             Kind::DoubleHopf => rest.iter().any(on_axis) && held.iter().all(on_axis),
             Kind::FoldTorus | Kind::FlipTorus if self.held != Kind::Torus => rest.iter().any(on_circle),
             Kind::DoubleTorus => rest.iter().any(on_circle),
@@ -199,7 +204,12 @@ impl Monitor for CodimensionTwo<'_> {
             let setting = Setting { field: self.field, scales: self.scales, parameters, axes: Vec::new() };
             return map_form::is_simple(&setting, at);
         }
-        if self.kind == Kind::Cusp && of_cycle { fold::parameters_rest(ends, at) } else { self.confirms(at) }
+        if self.kind == Kind::Cusp && of_cycle {
+            return fold::parameters_rest(ends, at);
+        }
+        // In a conservative system the eigenvalue 0 is double all along the curve.
+        let always_double = || ends.iter().all(|end| self.is_simple(end) == Some(false));
+        self.confirms(at) || self.kind == Kind::Cusp && always_double()
     }
 
     fn jump(&self) -> usize {

@@ -6,7 +6,7 @@
 
 use super::hopf;
 use crate::contract::{Monitor, VectorField};
-use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::diagram::{Cycle, Kind, Point, Solution, Symmetry};
 use crate::problem::mesh;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -152,8 +152,8 @@ impl Monitor for Narrows<'_> {
 /// Difference between a solution and its mirror image, for a cycle shifted by half a period if `half` is set: vanishes
 /// where the solution becomes symmetric.
 pub struct Mirrors {
-    /// Components that change sign under the reflection.
-    pub reflection: Vec<bool>,
+    /// Symmetry that maps the solution to its mirror image.
+    pub symmetry: Symmetry,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
     /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
@@ -180,7 +180,11 @@ impl Mirrors {
             // An angle and its mirror image lie symmetrically about a multiple of half a turn.
             twice[c] = period * (2.0 * mean(c) / period).round();
         }
-        let image = |k: usize| if self.reflection[k % n] { twice[k % n] - x[k] } else { x[k] };
+        let image = |k: usize| {
+            let (from, negated) = self.symmetry.image(k % n);
+            let value = x[k - k % n + from];
+            if negated { twice[k % n] - value } else { value }
+        };
         let left = (0..x.len()).map(|k| x[(k + shift) % x.len()] - image(k)).collect();
         (x, left)
     }
@@ -192,7 +196,7 @@ impl Monitor for Mirrors {
     }
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
-        let n = self.reflection.len();
+        let n = self.scales.len();
         let (x, own) = self.parts(reference);
         let other = if std::ptr::eq(reference, at) { own.clone() } else { self.parts(at).1 };
         if own.len() != other.len() {

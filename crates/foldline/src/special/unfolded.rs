@@ -13,7 +13,7 @@
 //! **Source.** allgower1990, §8 (unfolding of branch points); doedel2003 (cycles).
 
 use crate::contract::{Batch, Examination, Parameters, Singular, VectorField, ZeroProblem};
-use crate::diagram::{Cycle, Mesh, Point, Solution};
+use crate::diagram::{Cycle, Mesh, Point, Solution, Symmetry};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::{Axis, Setting};
 use num_complex::Complex64;
@@ -349,8 +349,8 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.unknowns_of(point)
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
-        self.cycles.images(beside, point, reflection, within)
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
+        self.cycles.images(beside, point, symmetry, within)
     }
 }
 

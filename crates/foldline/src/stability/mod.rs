@@ -11,12 +11,36 @@ use num_complex::Complex64;
 /// different units; what they leave is balanced by the sizes of rows and columns. Returns NaN for every eigenvalue if
 /// the matrix is not finite.
 pub fn eigenvalues(fx: &[f64], n: usize, scales: &[f64]) -> Vec<Complex64> {
-    let mut scaled: Vec<f64> = (0..n * n).map(|k| fx[k] * scales[k % n] / scales[k / n]).collect();
-    balance(&mut scaled, n);
-    match periodic_schur::eigenvalues(&scaled, n) {
-        Some(found) => found.into_iter().map(|e| e.value()).collect(),
-        None => vec![Complex64::new(f64::NAN, f64::NAN); n],
+    let scaled: Vec<f64> = (0..n * n).map(|k| fx[k] * scales[k % n] / scales[k / n]).collect();
+    let mut found = Vec::with_capacity(n);
+    for own in blocks(&scaled, n) {
+        let size = own.len();
+        let mut block: Vec<f64> = (0..size * size).map(|k| scaled[own[k / size] * n + own[k % size]]).collect();
+        balance(&mut block, size);
+        let Some(values) = periodic_schur::eigenvalues(&block, size) else {
+            return vec![Complex64::new(f64::NAN, f64::NAN); n];
+        };
+        found.extend(values.into_iter().map(|e| e.value()));
     }
+    found.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    found
+}
+
+/// Sets of states that act on each other, directly or through others. In an order of these sets the matrix `[n × n]` is
+/// block triangular, so that its eigenvalues are those of the blocks, and those of slow states keep their digits beside
+/// fast states that follow them.
+fn blocks(a: &[f64], n: usize) -> Vec<Vec<usize>> {
+    let mut reaches: Vec<bool> = (0..n * n).map(|k| a[k] != 0.0 || k % n == k / n).collect();
+    for via in 0..n {
+        for i in (0..n).filter(|i| *i != via) {
+            if reaches[i * n + via] {
+                (0..n).for_each(|j| reaches[i * n + j] |= reaches[via * n + j]);
+            }
+        }
+    }
+    let mutual = |i: usize, j: usize| reaches[i * n + j] && reaches[j * n + i];
+    let first = |i: &usize| (0..*i).all(|j| !mutual(*i, j));
+    (0..n).filter(first).map(|i| (i..n).filter(|j| mutual(i, *j)).collect()).collect()
 }
 
 /// Replaces a matrix `[n × n]` by D⁻¹ A D, with a diagonal D of powers of two such that each row and the column with its
@@ -56,6 +80,18 @@ fn balance(a: &mut [f64], n: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn states_that_follow_others_do_not_disturb_their_eigenvalues() {
+        // x' = mu x - y, y' = x + mu y, z' = -(z - x)/eps, w' = z - w: three blocks.
+        let (mu, rate) = (1e-12, 1e12);
+        let fx = [mu, -1.0, 0.0, 0.0, 1.0, mu, 0.0, 0.0, rate, 0.0, -rate, 0.0, 0.0, 0.0, 1.0, -1.0];
+        assert_eq!(blocks(&fx, 4), [vec![0, 1], vec![2], vec![3]]);
+        let found = eigenvalues(&fx, 4, &[1.0; 4]);
+        assert_eq!(found[0], Complex64::new(-rate, 0.0));
+        let slow: Vec<_> = found.iter().filter(|z| z.im != 0.0).collect();
+        assert!(slow.len() == 2 && slow.iter().all(|z| (z.re - mu).abs() < 1e-15), "{found:?}");
+    }
 
     #[test]
     fn a_slow_growth_rate_survives_beside_a_fast_mode() {

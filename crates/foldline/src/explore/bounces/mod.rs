@@ -99,8 +99,7 @@ pub(super) fn bounces(
     for motion in motions.iter().take(CORRECTED) {
         let Some(point) = polish(system, parameters, tolerance, motion) else { continue };
         let Solution::Cycle(cycle) = &point.solution else { continue };
-        let known =
-            |other: &Point| point.difference(other, system.measure(), &system.reflections[0]) < 30.0 * tolerance;
+        let known = |other: &Point| point.distance(other, system.measure()) < 30.0 * tolerance;
         if spectral_ratio(cycle, whirl) == Some((p, q)) && !cycles.iter().any(known) {
             let stable = point.unstable == 0;
             cycles.push(point);

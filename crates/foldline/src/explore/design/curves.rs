@@ -43,7 +43,7 @@ impl Search<'_> {
             };
             close(a, at, self.design.free)
                 && close(v, value, self.design.vary)
-                && other.difference(point, self.system.measure(), &[]) < ALIKE
+                && other.distance(point, self.system.measure()) < ALIKE
         };
         self.curves.iter().filter(|(_, kind)| *kind == seed.special.kind).any(|(index, _)| {
             let curve = &self.legs[*index];

@@ -60,7 +60,7 @@ impl Search<'_> {
         }
         let mut distinct: Vec<Point> = Vec::new();
         for point in found {
-            if !distinct.iter().any(|own| own.difference(&point, self.system.measure(), &[]) < SAME) {
+            if !distinct.iter().any(|own| own.distance(&point, self.system.measure()) < SAME) {
                 distinct.push(point);
             }
         }

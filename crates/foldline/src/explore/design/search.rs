@@ -303,7 +303,7 @@ impl<'s> Search<'s> {
     /// True if two solutions at one value of the branch's parameter are the same.
     fn same(&self, a: &Point, b: &Point) -> bool {
         const SAME: f64 = 1e-4;
-        self.at(a) == self.at(b) && a.difference(b, self.system.measure(), &[]) < SAME
+        self.at(a) == self.at(b) && a.distance(b, self.system.measure()) < SAME
     }
 
     /// A point with its profile.

@@ -49,7 +49,7 @@ use super::mesh::Passage;
 use super::piecewise::{self, Obstacle, PiecewiseFlow, Switched};
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
-use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::diagram::{Cycle, Mesh, Point, Solution, Symmetry, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{all_finite, axpy, larger, same};
@@ -857,10 +857,10 @@ impl ZeroProblem for CycleProblem<'_> {
         }
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
         match self.is_open() {
-            true => self.mirrored(beside, point, reflection, within),
-            false => self.in_phase(beside, point, reflection, within),
+            true => self.mirrored(beside, point, symmetry, within),
+            false => self.in_phase(beside, point, symmetry, within),
         }
     }
 

@@ -28,7 +28,7 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Examination, Parameters, VectorField, ZeroProblem};
-use crate::diagram::{Point, Solution};
+use crate::diagram::{Point, Solution, Symmetry};
 use crate::linalg::ends::Ends;
 use crate::linalg::lane::Lane;
 use crate::linalg::system::{System, either};
@@ -271,12 +271,12 @@ impl CycleProblem<'_> {
         (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), along.abs())
     }
 
-    /// Copies of a point under a reflection; see [`ZeroProblem::images`].
+    /// Copies of a point under a symmetry; see [`ZeroProblem::images`].
     pub(super) fn mirrored(
         &self,
         beside: &[f64],
         point: &Point,
-        reflection: &[bool],
+        symmetry: &Symmetry,
         within: f64,
     ) -> Vec<[Vec<f64>; 2]> {
         let Solution::Cycle(cycle) = &point.solution else { return Vec::new() };
@@ -286,9 +286,7 @@ impl CycleProblem<'_> {
         }
         let moved = |profile: &[f64]| {
             let mut own = self.passed(profile, &cycle.mesh, &self.mesh);
-            for c in (0..self.n).filter(|c| reflection.get(*c).copied().unwrap_or(false)) {
-                own[c..].iter_mut().step_by(self.n).for_each(|x| *x = -*x);
-            }
+            symmetry.apply(&mut own);
             own
         };
         let u = [&moved(&cycle.profile)[..], &[1.0], &self.setting.unknowns_of(point)].concat();

@@ -11,7 +11,7 @@
 
 use super::CycleProblem;
 use crate::contract::ZeroProblem;
-use crate::diagram::{Cycle, Point, Solution};
+use crate::diagram::{Cycle, Point, Solution, Symmetry};
 
 /// Number of equally spaced shifts at which two profiles are compared.
 const PLACES: usize = 480;
@@ -26,20 +26,18 @@ impl CycleProblem<'_> {
         &self,
         beside: &[f64],
         point: &Point,
-        reflection: &[bool],
+        symmetry: &Symmetry,
         within: f64,
     ) -> Vec<[Vec<f64>; 2]> {
         let Solution::Cycle(cycle) = &point.solution else { return Vec::new() };
-        let (n, size, whole) = (self.n, self.profile_size(), cycle.profile.len());
+        let (size, whole) = (self.profile_size(), cycle.profile.len());
         if cycle.degree != self.scheme.degree || point.tangent.len() + size != whole + beside.len() {
             return Vec::new();
         }
         let mirrored = |profile: &[f64], gain: &[f64]| -> Cycle {
             let (mut profile, mut gain) = (profile.to_vec(), gain.to_vec());
-            for c in (0..n).filter(|c| reflection.get(*c).copied().unwrap_or(false)) {
-                profile[c..].iter_mut().step_by(n).for_each(|v| *v = -*v);
-                gain.get_mut(c).into_iter().for_each(|v| *v = -*v);
-            }
+            symmetry.apply(&mut profile);
+            symmetry.apply(&mut gain);
             Cycle { profile, gain, ..cycle.clone() }
         };
         let states = mirrored(&cycle.profile, &cycle.gain);
@@ -66,7 +64,7 @@ impl CycleProblem<'_> {
         }
         let images = self.shifts(&beside[..size], &states, room.sqrt()).into_iter().map(|shift| {
             let mut u = [&self.moved(&states, shift)[..], &scalars].concat();
-            self.setting.nearest_copy(&mut u[..size], &beside[..n]);
+            self.setting.nearest_copy(&mut u[..size], &beside[..self.n]);
             self.settle(&mut u);
             [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
         });
@@ -262,12 +260,12 @@ mod tests {
         let beside: Vec<f64> = turns.profile.iter().copied().chain([2.0, 1.0]).collect();
         problem.anchor(&beside);
         let point = problem.point(&beside, &beside, Default::default());
-        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-2).len(), 3);
-        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-5).len(), 1);
+        assert_eq!(problem.in_phase(&beside, &point, &Symmetry::identity(), 1e-2).len(), 3);
+        assert_eq!(problem.in_phase(&beside, &point, &Symmetry::identity(), 1e-5).len(), 1);
     }
 
     #[test]
-    fn images_have_the_phase_and_the_reflection_of_the_other_cycle() {
+    fn images_have_the_phase_and_the_symmetry_of_the_other_cycle() {
         let model = field();
         let scales = [1.0, 1.0];
         let setting = Setting { field: &model, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
@@ -282,7 +280,7 @@ mod tests {
             let sign = if reflected { -1.0 } else { 1.0 };
             let profile = there.profile.iter().map(|v| sign * v).collect();
             point.solution = Solution::Cycle(Cycle { profile, ..there.clone() });
-            let images = problem.in_phase(&beside, &point, &[reflected; 2], 1e-3);
+            let images = problem.in_phase(&beside, &point, &Symmetry::reflection(&[reflected; 2]), 1e-3);
             let [[u, along]] = &images[..] else { panic!("{} images", images.len()) };
             assert_eq!((u.len(), &along[along.len() - 2..]), (beside.len(), &[0.5, 0.25][..]));
             let off = u.iter().zip(&beside).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));

@@ -29,7 +29,7 @@ use super::cycle::CycleProblem;
 use super::gauss::Scheme;
 use super::{Axis, Setting, averages, extremes};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
-use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::diagram::{Cycle, Mesh, Point, Solution, Symmetry, Trust};
 use crate::linalg::dot;
 use crate::stability::floquet::{self, Course, Floquet, Frames};
 use num_complex::Complex64;
@@ -558,8 +558,8 @@ impl ZeroProblem for ImpactProblem<'_> {
         }
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
-        if reflection.contains(&true) {
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
+        if !symmetry.is_identity() {
             return Vec::new();
         }
         let Some((flights, first)) = self.flights_of(point) else { return Vec::new() };

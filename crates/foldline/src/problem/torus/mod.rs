@@ -40,7 +40,7 @@ use super::cycle::CycleProblem;
 use super::gauss::Scheme;
 use super::{Setting, mesh};
 use crate::contract::{Examination, Singular, ZeroProblem};
-use crate::diagram::{Mesh, Point, Solution, Torus, Trust};
+use crate::diagram::{Mesh, Point, Solution, Symmetry, Torus, Trust};
 use crate::linalg::{all_finite, larger, same};
 pub use errors::LARGEST;
 use joint::Joint;
@@ -396,8 +396,8 @@ impl ZeroProblem for TorusProblem<'_> {
         }
     }
 
-    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
-        self.in_phase(beside, point, reflection, within)
+    fn images(&mut self, beside: &[f64], point: &Point, symmetry: &Symmetry, within: f64) -> Vec<[Vec<f64>; 2]> {
+        self.in_phase(beside, point, symmetry, within)
     }
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {

@@ -7,7 +7,7 @@ use super::TorusProblem;
 use super::phases;
 use super::start::transferred;
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::diagram::{Point, Solution};
+use crate::diagram::{Point, Solution, Symmetry};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -157,13 +157,13 @@ impl TorusProblem<'_> {
         best
     }
 
-    /// Copies of a point under a reflection, in the phase in which they are closest to `beside`. Without forcing the time
+    /// Copies of a point under a symmetry, in the phase in which they are closest to `beside`. Without forcing the time
     /// would have to be shifted as well, and no copy is found.
     pub(super) fn in_phase(
         &self,
         beside: &[f64],
         point: &Point,
-        reflection: &[bool],
+        symmetry: &Symmetry,
         within: f64,
     ) -> Vec<[Vec<f64>; 2]> {
         let Solution::Torus(torus) = &point.solution else { return Vec::new() };
@@ -174,9 +174,7 @@ impl TorusProblem<'_> {
         }
         let moved = |profile: &[f64]| {
             let mut own = transferred(profile, self.n, &self.scheme, &torus.mesh, &self.mesh);
-            for c in (0..self.n).filter(|c| reflection.get(*c).copied().unwrap_or(false)) {
-                own[c..].iter_mut().step_by(self.n).for_each(|x| *x = -*x);
-            }
+            symmetry.apply(&mut own);
             own
         };
         let (profile, tangent) = (moved(&torus.profile), moved(&point.tangent[..whole]));

@@ -1,0 +1,23 @@
+//! Every test of this crate that needs no access to its inside, as one program: it is linked once, and all tests share the
+//! processors.
+
+mod basins;
+mod designs;
+mod emitted;
+mod growing_study;
+mod hostile;
+mod model_file;
+mod model_language;
+mod responses;
+mod run_file;
+mod study_file;
+mod symmetry;
+
+#[test]
+fn every_file_is_part_of_this_program() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    for name in files.filter_map(|file| file.strip_suffix(".rs").map(String::from)).filter(|name| name != "main") {
+        assert!(include_str!("main.rs").contains(&format!("\nmod {name};\n")), "tests/{name}.rs is not run");
+    }
+}
