@@ -382,8 +382,8 @@ pub struct Table {
     /// One line per branch, with how it ended
     #[arg(long, group = "what")]
     pub branches: bool,
-    /// Notes: what was found for each seed, the routes of the homotopies, switches that led to known branches, what was not
-    /// reached
+    /// Notes: what was found for each seed, the paths of the homotopies, switches that led to known branches, what was
+    /// not reached
     #[arg(long, group = "what")]
     pub notes: bool,
     /// Results of surveys and sweeps

@@ -364,7 +364,7 @@ impl Watch<'_> {
             _ if error > KNOWN => format!("its rotation number is known to {error:.0e} only"),
             _ if near.is_some() => {
                 let (p, q) = near.unwrap_or_default();
-                format!("its rotation number cannot be told from {p}/{q}, at which it may lock to a cycle")
+                format!("its rotation number cannot be distinguished from {p}/{q}, at which it may lock to a cycle")
             }
             _ if change > STEADY => {
                 format!("it still changes, by {change:.0e} of its amplitude over half of the record")

@@ -83,7 +83,7 @@ pub fn first_torus(
     let why = reasons.first().map(|why| format!(", the first because {why}")).unwrap_or_default();
     Err(format!(
         "no quasi-periodic motion was reached: of {tried} samples {settled} came to rest or to a cycle, {chaotic} to chaos, \
-         {escaped} escaped, and {} could not be told{why}",
+         {escaped} escaped, and {} were undecided{why}",
         reasons.len()
     ))
 }

@@ -339,7 +339,7 @@ fn born(
         ));
     }
     let mesh = mesh::uniform(20);
-    let Solution::Equilibrium(x) = &at.point.solution else { return Err("it is no equilibrium".into()) };
+    let Solution::Equilibrium(x) = &at.point.solution else { return Err("it is not an equilibrium".into()) };
     let cycle = Cycle::at_rest(x, TAU / omega, degree, &mesh);
     let scheme = Scheme::at(degree, stiffness::suited(system.field, &system.scales, &at.point.parameters, &cycle));
     let (mut direction, period) = hopf::direction(system.field, &at.point, omega, &system.scales, scheme, &mesh)

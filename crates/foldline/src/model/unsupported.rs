@@ -32,7 +32,7 @@ const KINDS: [Kind; 15] = [
         &["boundarie", "boundarycondition", "bc", "bvp", "nbc", "nint"],
         "a boundary-value problem is a model with the tables [interval] and [boundary]",
         "give `[interval]` with its `length`, and `[boundary]` with one condition for each state, such as `left = \
-         \"u@0\"`; integral conditions stand under [integrals]",
+         \"u@0\"`; integral conditions belong under [integrals]",
     ),
     (
         &["integralcondition", "integralconstraint", "constraint", "algebraic", "dae"],
