@@ -1,4 +1,4 @@
-//! Quasi-periodic motion, locked cycles and chaos told apart by one trajectory.
+//! Quasi-periodic motion, locked cycles and chaos, distinguished by means of one trajectory.
 //!
 //! **Idea.** A trajectory that neither comes to rest nor repeats itself is observed at equal intervals: the forcing
 //! period or, without forcing, the period of its strongest spectral line. From N such states follow the rotation number

@@ -1,4 +1,4 @@
-//! Answers for problems that are not solved here, and for settings of other programs without a counterpart.
+//! Messages about problems that are not solved here, and about settings of other programs that have no counterpart.
 //!
 //! **Idea.** An unknown key, value or function name may ask for a kind of problem. The answer names it and says what to
 //! do instead, here or with another program.
