@@ -444,11 +444,11 @@ pub trait ZeroProblem {
 /// Level of detail at which a point is computed, besides its solution and parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sight {
-        /// The point and its tangent.
+    /// The point and its tangent.
     Tangent,
-        /// The point, its tangent and its spectrum.
+    /// The point, its tangent and its spectrum.
     Stability,
-        /// Everything that a stored point contains.
+    /// Everything that a stored point contains.
     Everything,
 }
 
@@ -463,7 +463,7 @@ pub struct Separate<'m> {
 /// Events between two points, from a monitor that distinguishes them.
 #[derive(Default)]
 pub struct Events<'m> {
-        /// Events that are apparent at both points.
+    /// Events that are apparent at both points.
     pub seen: Vec<Separate<'m>>,
     /// Positions between the points, as fractions of their distance, at which a value may have passed zero before it
     /// returns.
