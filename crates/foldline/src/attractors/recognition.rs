@@ -18,9 +18,9 @@
 //!                               |λ| ≤ 3 ε or |λ| N ≤ 1/2
 //! ```
 //!
-//! A motion that locks to p/q has ρ = p/q exactly, and so fails (3) whatever else it does. λ is a weighted average over
-//! eight parts of the record, and ε three times the standard error of their mean. δ is at least ten times the accuracy of the
-//! integration.
+//! A motion that locks to p/q has ρ = p/q exactly, and so fails (3) whatever else it does. λ is the mean of weighted
+//! averages over the last seven of eight parts of the record, and ε is three times the standard error of this mean. δ
+//! is at least ten times the accuracy of the integration.
 //!
 //! **Source.** das2017 (weighted averages), laskar1999 (frequencies), benettin1980 (exponents).
 //!
