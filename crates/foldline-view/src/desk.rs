@@ -263,7 +263,7 @@ impl Desk {
         let start = Instant::now();
         while is_written(folder) {
             if start.elapsed() > STOPS {
-                return Err("the run has been asked to stop but goes on; try again later".to_string().into());
+                return Err("the run was asked to stop but has not stopped yet; try again later".to_string().into());
             }
             std::thread::sleep(PAUSE);
         }
