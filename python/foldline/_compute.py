@@ -124,7 +124,7 @@ def run(
     ArgumentError
         If `study` is none of the three; the message shows the right call.
     InputError
-        With every mistake in the study: its place, and what would be right. Also if a file is missing.
+        With every mistake in the study: its place and a remedy. Also if a file is missing.
     RunFileError
         If `out` holds a run already, cannot be written, or holds the run of another study.
     Interrupted
@@ -254,7 +254,7 @@ def follow(
     Parameters
     ----------
     start : Solution
-        From `Model.settle` or `Model.attractors`, or a point of another branch. It is taken as it is, stable or not.
+        From `Model.settle` or `Model.attractors`, or a point of another branch. It is used as it is, stable or not.
     free : str or list of str
         Name of the parameter that varies; with `hold`, the names of one parameter more than there are held quantities. The first
         is the continuation parameter.
@@ -271,7 +271,7 @@ def follow(
         Kinds of special points at which to branch off, and how many levels deep: ``{"hopf": 1, "period-doubling": 2}``. ``{"hopf-2": 1}``
         means the second Hopf point only. The branches found are in `Branch.switched` and `Branch.diagram`.
     mark, stop : mapping, optional
-        Values of quantities to locate on the way, or to stop at: ``{"Omega": [4, 5], "r_max": 2}``.
+        Values of quantities to locate along the branch, or to stop at: ``{"Omega": [4, 5], "r_max": 2}``.
     peaks : list of str, optional
         Quantities whose largest and smallest values along the branch are located as special points of the kind ``peak``.
     max_points : int
@@ -292,11 +292,11 @@ def follow(
     Raises
     ------
     ArgumentError
-        If `start` is no solution, `range` no pair or missing, or a number is given as a string; the message shows the right call.
+        If `start` is not a solution, `range` is missing or not a pair, or a number is given as a string; the message shows the right call.
     InputError
         If the parameter is unknown, the range is reversed, empty or does not contain the start, or a value is not allowed.
     NoSolution
-        If the branch does not begin; the message says why.
+        If the branch cannot be started; the message says why.
     RunFileError
         As for `run`.
     Interrupted
@@ -402,7 +402,7 @@ def hold(
     ArgumentError, InputError
         As for `follow`.
     NoSolution
-        If the curve does not begin; the message says why.
+        If the curve cannot be started; the message says why.
 
     Examples
     --------
@@ -453,7 +453,7 @@ def homotopy(
     to : mapping
         Parameters that change together, with their target values.
     via : str
-        Name of a further parameter in which the solution may be moved on the way; none of those in `to`.
+        Name of a further parameter in which the solution may be moved along the path; not one of those in `to`.
     range : pair
         Smallest and largest value of that parameter.
     max_points : int
@@ -468,7 +468,7 @@ def homotopy(
     Returns
     -------
     Homotopy
-        `arrived`, `end` (the solution at the target), `route` (in sentences), and the branches on the way.
+        `arrived`, `end` (the solution at the target), `route` (in sentences), and the branches of the path.
 
     Raises
     ------

@@ -152,7 +152,7 @@ class Diagram:
             Units in which quantities are shown: ``{"Omega": "rpm", "r": "mm"}``; ``"orders:Omega"`` divides a frequency by a speed.
         sweeps : Sweep, Survey or list of them, optional
             Drawn over the branches; by default those of the study. An empty list draws none. Marks of a sweep point in its direction,
-            filled upwards and hollow downwards; jumps are dotted. The marks of a survey tell equilibria (squares) from cycles (circles).
+            filled upwards and hollow downwards; jumps are dotted. The marks of a survey distinguish equilibria (squares) from cycles (circles).
 
         Returns
         -------
@@ -263,7 +263,7 @@ def _unpacked(kind: type[Diagram], run: bytes) -> Diagram:
 
 
 class Homotopy(Diagram):
-    """The result of `foldline.homotopy`: a solution carried to new parameter values, and the branches on the way.
+    """The result of `foldline.homotopy`: a solution carried to new parameter values, and the branches of the path.
 
     Examples
     --------

@@ -58,7 +58,7 @@ class NoSolution(Error):
 
 
 class RunFileError(Error):
-    """A run file cannot be made, read or resumed."""
+    """A run file cannot be written, read or resumed."""
 
 
 class DeviceError(Error):

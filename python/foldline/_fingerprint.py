@@ -1,4 +1,4 @@
-"""What tells a function from others: its source, and the values and functions that it refers to."""
+"""Identity of a function: its source, and the values and functions that it refers to."""
 
 from __future__ import annotations
 

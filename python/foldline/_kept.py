@@ -1,4 +1,4 @@
-"""Answers of a map over parameters in a folder: one line each, appended as they come, so that a map killed at any instant goes on."""
+"""Answers of a map over parameters in a folder: one line each, appended as they come, so that a map killed at any instant can be continued."""
 
 from __future__ import annotations
 

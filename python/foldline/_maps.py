@@ -56,7 +56,7 @@ def map(
     max_time: float | None = None,
     progress: CellProgress = None,
 ) -> xarray.Dataset:
-    """Maps over parameters: asks the same question at many parameter values, on all processors or on a cluster.
+    """Computes the same quantities at many parameter values, on all processors or on a cluster.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def map(
         Computes on the workers of this client: a `LocalCluster`, or any cluster, such as one of SLURM by dask-jobqueue. By default the
         threads of this process.
     out : path, optional
-        Folder to which each answer is written as it comes. Repeating the call continues the map and computes nothing twice.
+        Folder to which each answer is written as it is computed. Repeating the call continues the map and computes no answer twice.
         A folder of another map is refused.
     jobs : int, optional
         Number of threads without a client; by default the number of processors.
@@ -326,7 +326,7 @@ def latin_hypercube(ranges: Mapping[str, tuple[float, float]], count: int, *, se
     Raises
     ------
     ArgumentError, InputError
-        If a range is no pair, or reversed.
+        If a range is not a pair, or is reversed.
 
     Examples
     --------

@@ -375,7 +375,7 @@ class Model:
         Raises
         ------
         ArgumentError, InputError
-            If a value is no number, or a state is unknown or missing.
+            If a value is not a number, or a state is unknown or missing.
 
         Examples
         --------
@@ -501,7 +501,7 @@ def model(
     Parameters
     ----------
     path : path or str
-        The path of a model file, or the text of one, which has line breaks. No other argument is allowed beside it.
+        The path of a model file, or its text: a string with line breaks. No other argument is allowed beside it.
     equations : mapping
         The time derivative of every state; for a map its next value.
     states : str, list or mapping
@@ -536,9 +536,9 @@ def model(
     Raises
     ------
     ArgumentError
-        If the decorator stands without brackets, or a function is given in place of a path; the message shows the right call.
+        If the decorator is used without brackets, or a function is given in place of a path; the message shows the right call.
     InputError
-        With every mistake, its place and what would be right. Also if the file is missing.
+        With every mistake, its place and a remedy. Also if the file is missing.
     TraceError
         If the function does something that cannot be compiled, with the line and a remedy; and if it takes ``(t, y)``, as SciPy calls it.
 

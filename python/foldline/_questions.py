@@ -254,7 +254,7 @@ def question_of(what: Any, model: Model, limits: Limits, names: Sequence[str]) -
         for own in quantities:
             if own not in known:
                 words = f"{suggestion(own, known)}; or 'motions', 'shares', a study, or a function of a case"
-                raise InputError(f"a map cannot show {own!r}: it is no quantity of a settled motion\n  help: {words}")
+                raise InputError(f"a map cannot show {own!r}: it is not a quantity of a settled motion\n  help: {words}")
         return Settled(quantities, limits)
     cure = "what='motions', 'shares', ['x_max', 'period'], a study, or a function of a case"
     raise wrong_kind("what a map is to compute must be a name, a study or a function", what, cure)

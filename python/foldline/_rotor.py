@@ -30,7 +30,7 @@ def _reduced(matrices: dict[str, np.ndarray], per_node: int) -> dict[str, np.nda
     """Rows and columns of lateral motion, which must not be coupled to the others."""
     n = matrices["M"].shape[0]
     if n % per_node:
-        raise ArgumentError(f"M has {n} rows, which is no multiple of {per_node}\n  help: give `per_node=4` or `per_node=6`")
+        raise ArgumentError(f"M has {n} rows, which is not a multiple of {per_node}\n  help: give `per_node=4` or `per_node=6`")
     kept = np.array([per_node * node + k for node in range(n // per_node) for k in _LATERAL[per_node]])
     others = np.setdiff1d(np.arange(n), kept)
     for name, own in matrices.items():

@@ -123,7 +123,7 @@ def strobe(
     """Records the state of a forced model once in every forcing period while a parameter varies in steps.
 
     A cycle of one forcing period shows as one point, one of two periods as two, a quasi-periodic or chaotic motion as a cloud. The points come
-    from plain simulation: nothing tells whether the motion had settled after `transient` periods. `foldline.sweep` does.
+    from plain simulation, which does not check that the motion has settled after `transient` periods. `foldline.sweep` does.
 
     Parameters
     ----------

@@ -129,8 +129,8 @@ def survey(
 ) -> Survey:
     """Finds the attractors and their basin fractions at values of a parameter by simulation, as `[[survey]]` does in a study.
 
-    At each value, initial states are drawn from the ranges of the states and integrated until they have settled. No equation is solved for the
-    motions, so a survey finds the attractors independently of the branches.
+    At each value, initial states are drawn from the ranges of the states and integrated until they have settled. A survey only integrates
+    in time, so it finds the attractors independently of the branches.
 
     Parameters
     ----------

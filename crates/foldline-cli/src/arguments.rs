@@ -49,7 +49,7 @@ pub enum Command {
     /// Run a study and print its special points
     #[command(after_help = EXIT_CODES)]
     Run(Run),
-    /// Compute the bifurcation diagram of a model over a range of a parameter, with no starting solutions given
+    /// Compute the bifurcation diagram of a model over a range of a parameter, without given starting solutions
     #[command(after_help = EXIT_CODES)]
     Explore(Explore),
     /// Integrate a model from one initial state; print the trajectory, or draw it
@@ -70,18 +70,18 @@ pub enum Command {
     ImportAuto(ImportAuto),
     /// Sample initial states of a model and list the attractors they reach
     Attractors(Attractors),
-    /// Basins of attraction: the fraction of a box of initial states that each attractor takes, and a picture of a plane
+    /// Basins of attraction: the fraction of a box of initial states that leads to each attractor, and a picture of a plane section
     #[command(after_help = BASINS_CODES)]
     Basins(Basins),
-    /// Write the ensemble of a model as CUDA or C source, for programs of your own; in Python, foldline.ensemble runs it
+    /// Write the ensemble of a model as CUDA or C source, for use in other programs; in Python, foldline.ensemble runs it
     Emit(Emit),
     /// Check a model or study file for errors
     Check(Check),
-    /// Natural frequencies and damping of a rotor over its speed
+    /// Natural frequencies and damping of a rotor as functions of its speed
     Campbell(Campbell),
     /// Critical speeds of a rotor, undamped and damped
     CriticalSpeeds(CriticalSpeeds),
-    /// Amplitudes of a rotor under its unbalance over the speed, without rings and other nonlinear forces
+    /// Unbalance response of a rotor as a function of its speed, without rings and other nonlinear forces
     UnbalanceResponse(UnbalanceResponse),
     /// Recompute the figures and claims of a publication
     #[command(after_help = EXIT_CODES)]
@@ -135,7 +135,7 @@ pub struct Campbell {
 pub enum Frame {
     /// As a fixed probe measures them
     Fixed,
-    /// As the shaft sees them
+    /// As seen from the shaft
     Rotating,
 }
 
@@ -232,7 +232,7 @@ pub struct Explore {
     /// Set another parameter; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Also continue folds in a second parameter, to reach branches that nothing else leads to
+    /// Also continue folds in a second parameter, to find isolated branches
     #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
     pub connect: Option<String>,
     /// Number of parameter values at which to search for attractors and equilibria
@@ -379,11 +379,11 @@ pub struct Table {
     /// All accepted points, with multipliers and accuracy
     #[arg(long, group = "what")]
     pub points: bool,
-    /// One line per branch, with how it ended
+    /// One line per branch, including how its sides ended
     #[arg(long, group = "what")]
     pub branches: bool,
-    /// Notes: what was found for each seed, the routes of the homotopies, switches that led to known branches, what was not
-    /// reached
+    /// Notes: what was found for each seed, the paths of the homotopies, switches that led to known branches, what was
+    /// not reached
     #[arg(long, group = "what")]
     pub notes: bool,
     /// Results of surveys and sweeps
@@ -406,7 +406,7 @@ pub struct Table {
     /// parameters fixed
     #[arg(long, value_name = "N", allow_negative_numbers = true, requires = "branch")]
     pub position: Option<i64>,
-    /// With --uncertainty: number of samples at which the special points are solved again
+    /// With --uncertainty: number of samples at which the special points are recomputed
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     pub samples: u32,
     /// Only this branch, or the legs of this homotopy
@@ -680,7 +680,7 @@ pub struct Emit {
     /// C source with a main program, instead of CUDA
     #[arg(long)]
     pub c: bool,
-    /// Parameters of its own for every trajectory
+    /// Separate parameters for every trajectory
     #[arg(long)]
     pub own_parameters: bool,
     /// End trajectories where they settle on known solutions

@@ -26,7 +26,7 @@ pub enum Failure {
     Typed(String),
     /// A failure outside the program.
     Outside(String),
-    /// The reader of the output has closed it.
+    /// The program that reads the output has closed it.
     NoReader,
 }
 

@@ -137,7 +137,7 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     }
     let whole = tell_short(&diagram, &study.plan, &study.model)?;
     if !study.plan.homotopies.is_empty() {
-        report(format_args!("routes of the homotopies: foldline table {} --notes", folder.display()))?;
+        report(format_args!("paths of the homotopies: foldline table {} --notes", folder.display()))?;
     }
     let why = limit.filter(|_| clock.is_up()).map_or(String::new(), |limit| format!(" at the time limit of {limit:?}"));
     if stopped {

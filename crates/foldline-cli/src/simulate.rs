@@ -246,7 +246,7 @@ fn ended(course: &Course, end: f64, model: &Model) -> Result<Outcome, Failure> {
              here"
         }
         Ending::Chatter => {
-            "chatter: its impacts follow each other ever faster and accumulate; what follows, lasting contact, is not \
+            "chatter: its impacts follow each other ever faster and accumulate; the sustained contact that follows is not \
              computed"
         }
         Ending::StepLimit => "the limit on the number of steps was reached (--max-steps)",

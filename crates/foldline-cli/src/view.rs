@@ -113,7 +113,7 @@ fn desk_of_run(watch: &Watch, folder: &Path, typed: &Typed) -> Option<Desk> {
         return Some(Desk::new(files(Path::new(&own.file), &own, folder), program(typed), watch.clone(), None));
     }
     watch.editable(Err(format!(
-        "{} is not there, or it or its model has changed since the run began; `foldline view STUDY.toml --out DIR` names it",
+        "{} is missing, or it or its model has changed since the run began; `foldline view STUDY.toml --out DIR` names it",
         own.file
     )));
     None

@@ -32,7 +32,7 @@ pub fn name(basins: &Basins, number: usize, map: bool) -> String {
     }
 }
 
-/// Every fate but that of an attractor, with its name and colour.
+/// Every fate other than that of reaching an attractor, with its name and colour.
 pub const LOST: [(Fate, &str, &str); 5] = [
     (Fate::Unsettled, "not settled", "#c8c8c8"),
     (Fate::Escaped, "unbounded", palette::BLACK),

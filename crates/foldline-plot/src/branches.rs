@@ -67,8 +67,8 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
     curves.into_iter().chain(specials).collect()
 }
 
-/// Error bars of special points, given by branch and index with the standard deviation of the parameter of the branch: two
-/// standard deviations to either side. Empty if no axis shows that parameter.
+/// Error bars of special points: two standard deviations of the branch's parameter to either side. The points are given
+/// by branch and index with the standard deviation. Empty if no axis shows that parameter.
 pub fn deviation_layers(
     diagram: &Diagram,
     x: Quantity,
@@ -92,7 +92,7 @@ pub fn deviation_layers(
 }
 
 /// Labels beside the curves where there is room, one for each branch that was not switched to, so that curves can be
-/// told apart without their colours. None for a single branch, or for more than the legend names.
+/// identified without their colours. There are none for a single branch, or for more branches than the legend names.
 pub fn label_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
     let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
     if !(2..=MOST).contains(&roots.len()) {

@@ -4,8 +4,8 @@
 //! [`curve`]) once the axes are known ([`quantity`]); then everything is placed on the page ([`figure_svg`]). The page
 //! is SVG; PNG and PDF are made from it with the embedded font, so they look alike everywhere.
 //!
-//! Stable pieces are solid, unstable ones dashed, and the change lies exactly at the special point. A branch that
-//! starts at a special point of another has its colour, lighter.
+//! Stable pieces are solid and unstable ones dashed; the change lies exactly at the special point. A branch that starts
+//! at a special point of another branch has the colour of that branch, but lighter.
 
 pub mod basins;
 pub mod branches;

@@ -1,4 +1,4 @@
-//! Picture of one diagram.
+//! Picture of a single diagram.
 
 use crate::branches::{diagram_layers, label_layers, root_count};
 use crate::compose::figure_svg;
@@ -32,8 +32,8 @@ impl Default for Picture {
     }
 }
 
-/// The diagram with the values of quantities that need the profiles of its points, and those quantities of its points; the
-/// diagram itself, `None`, if there are none.
+/// The diagram with values of the quantities that are computed from profiles, and these quantities; `None` if the axes
+/// need no such quantity.
 fn with_values(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> (Option<Diagram>, [Quantity; 2]) {
     if !axes.iter().any(|axis| axis.needs_profile()) {
         return (None, axes);

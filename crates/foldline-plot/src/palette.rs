@@ -1,4 +1,4 @@
-//! Colours that can be told apart with every common kind of colour vision.
+//! Colours that are distinguishable with every common kind of colour vision.
 //!
 //! **Source.** okabe2008.
 

@@ -27,9 +27,8 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     })
 }
 
-/// Default horizontal axis: the free parameter of most points of branches. The runs of a homotopy, which only lead to
-/// branches, count only if there are no branches besides. Without any branch, it is the parameter of the first survey
-/// or sweep.
+/// Default horizontal axis: the free parameter of most points of branches. The runs of a homotopy count only if there
+/// are no other branches. Without any branch, it is the parameter of the first survey or sweep.
 pub fn default_x(diagram: &Diagram) -> Quantity {
     if let ([], Some(set)) = (&diagram.branches[..], diagram.responses.first()) {
         return Quantity::Parameter(set.free);

@@ -1,8 +1,8 @@
 //! Surveys and sweeps as layers drawn over the branches.
 //!
-//! **Idea.** A sweep is a thin line with marks that show its direction: △ while the parameter rises, ▽ while it falls;
-//! the line is interrupted at jumps. The motions of a survey are dots. Periodic motions are hollow marks, others
-//! (chaos, tori) small filled ones. Escaped trajectories are not drawn.
+//! **Idea.** A sweep is a thin line, interrupted at jumps, with marks that show its direction: △ while the parameter
+//! rises, ▽ while it falls. The motions of a survey are dots. Periodic motions are hollow marks, others (chaos, tori)
+//! small filled ones. Escaped trajectories are not drawn.
 
 use crate::figure::{Layer, Marker};
 use crate::palette::nth;

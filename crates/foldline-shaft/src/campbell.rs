@@ -7,8 +7,8 @@
 //!
 //! **Source.** friswell2010, chapter 6.
 //!
-//! **Departures.** Where coefficients depend on the speed, equation 1 is repeated with those at the speed found, until
-//! the speed no longer changes.
+//! **Departures.** Where coefficients depend on the speed, equation 1 is solved repeatedly, with the coefficients at
+//! the speed found, until the speed no longer changes.
 
 use crate::machine::Machine;
 use crate::modes::{Mode, Whirl, synchronous};
@@ -29,12 +29,12 @@ pub struct Critical {
     /// Speed at which the damped frequency equals the speed, with the eigenvalue there; `None` if the mode is
     /// overdamped or the iteration does not converge.
     pub damped: Option<(f64, Complex64)>,
-    /// False if coefficients that depend on the speed did not let the iteration converge.
+    /// False if the iteration for coefficients that depend on the speed did not converge.
     pub settled: bool,
 }
 
 impl Machine {
-    /// Parameters with another speed Ω in rad/s.
+    /// Returns the parameters with the speed Ω set to `speed`, in rad/s.
     pub fn at_speed(&self, parameters: &[f64], speed: f64) -> Vec<f64> {
         let mut own = parameters.to_vec();
         if let Some((index, factor)) = self.speed_parameter() {

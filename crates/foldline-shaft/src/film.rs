@@ -1,8 +1,9 @@
 //! Squeeze-film dampers: the force of a short bearing without rotation.
 //!
-//! **Idea.** In a short bearing the pressure at an angle follows from the speed at which the gap closes there. A journal with
-//! velocity v and eccentricity ε (over the clearance) closes the gap on the half circle around the direction of v; on the other half the film
-//! cavitates. So the force is an integral over that half circle, which has a closed form in the components of ε along and across v.
+//! **Idea.** In a short bearing the pressure at an angle follows from the speed at which the gap closes there. A
+//! journal with velocity v and eccentricity ε (relative to the clearance) closes the gap on the half circle around the
+//! direction of v; on the other half the film cavitates. The force is therefore an integral over that half circle,
+//! which has a closed form in the components of ε along and across v.
 //!
 //! **Equations.** With a = ε·v/|v|, b across, D = 1 - a² - b², A = µ R L³/c³,
 //!
@@ -13,12 +14,13 @@
 //!   (4)  I₂ = 3 a b S / D^{5/2} + b (2 - 2b² + a²) / ((1 - b²) D²)
 //! ```
 //!
-//! Over the whole circle the second terms of (3) and (4) are absent. On a circle of radius ε c around the centre the components are the well-known 2ε²/(1-ε²)² and
-//! πε/2(1-ε²)^{3/2}.
+//! Over the whole circle the second terms of (3) and (4) are absent. On a circle of radius ε c around the centre the
+//! components are the well-known 2ε²/(1-ε²)² and πε/2(1-ε²)^{3/2}.
 //!
 //! **Source.** Reynolds' equation for short bearings, hamrock2004; the half circle around v is where the pressure is positive.
 //!
-//! **Fails when** the journal touches, ε ≥ 1: the force is then not defined. At rest, v/|v| is regularised at a velocity of 1e-6 clearances per second.
+//! **Fails when** the journal touches, ε ≥ 1: the force is then not defined. At rest, v/|v| is regularised at a
+//! velocity of 1e-6 clearances per second.
 
 use crate::parts::Film;
 

@@ -55,7 +55,7 @@ impl Rotor {
         found
     }
 
-    /// Frame of the equations: the one asked for, or the rotating one where the rotor allows it.
+    /// Frame of the equations: the requested one, or else the rotating one if the rotor allows it.
     pub fn frame_for(&self, anisotropy: &[String]) -> Frame {
         self.frame.unwrap_or(if anisotropy.is_empty() { Frame::Rotating } else { Frame::Fixed })
     }

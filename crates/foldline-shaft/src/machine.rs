@@ -1,7 +1,7 @@
 //! Rotor with values: matrices for given parameters.
 //!
-//! **Idea.** Coefficients of bearings, unbalance and gravity may be expressions. They are the outputs of a small model
-//! with the parameters of the rotor's model, so that expressions, functions and tables mean the same in both.
+//! **Idea.** Coefficients of bearings, unbalance and gravity may be expressions. These become outputs of a small model
+//! with the parameters of the rotor's model, so that expressions, functions and tables have one meaning in both.
 
 use crate::assembly::{Assembly, Of};
 use crate::equations::{Assembled, SPEED, sag};

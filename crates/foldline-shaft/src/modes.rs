@@ -1,8 +1,9 @@
 //! Natural frequencies, modes and Campbell diagrams.
 //!
-//! **Idea.** The eigenvalue problem is solved for ω₀/λ: the lowest modes are then the largest eigenvalues and are as
-//! accurate as the stiffness matrix, not lost beside the highest ones. For an isotropic rotor each pair of coordinates is
-//! one complex number z = x + iy, which halves the problem and separates forward (Im λ > 0) from backward whirl.
+//! **Idea.** The eigenvalue problem is solved for ω₀/λ: the lowest modes then have the largest eigenvalues and are as
+//! accurate as the stiffness matrix, instead of being lost in the rounding errors of the highest ones. For an isotropic
+//! rotor each pair of coordinates is one complex number z = x + iy, which halves the problem and separates forward (Im
+//! λ > 0) from backward whirl.
 //!
 //! **Equations.** With D = C + Cᵢ + ΩG, S = K - ΩCᵢJ, and y = (q, q̇/ω₀):
 //!

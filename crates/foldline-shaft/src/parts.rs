@@ -97,7 +97,7 @@ pub struct Bearing {
     pub to: Option<usize>,
     /// Stiffness [[xx, xy], [yx, yy]].
     pub stiffness: [[Coefficient; 2]; 2],
-    /// Damping, likewise.
+    /// Damping [[xx, xy], [yx, yy]].
     pub damping: [[Coefficient; 2]; 2],
 }
 
@@ -147,9 +147,10 @@ pub struct Contact {
     pub stiffness: Coefficient,
     /// Coefficient of friction.
     pub friction: Coefficient,
-    /// Radius at which the surfaces slip; without it the shaft always slips forward.
+    /// Radius of the shaft at the contact, from which the slip velocity follows; without it the shaft always slips
+    /// forward.
     pub radius: Option<Coefficient>,
-    /// Slip velocity over which friction reverses smoothly; without it friction reverses at once.
+    /// Slip velocity over which friction reverses smoothly; without it friction reverses abruptly.
     pub reversal: Option<Coefficient>,
     /// Law of the normal force.
     pub law: Law,
@@ -187,7 +188,7 @@ pub struct Force {
     pub rotating: bool,
 }
 
-/// Damping of the shaft beside that of bearings.
+/// Damping of the shaft, in addition to that of bearings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Damping {
     /// Factor of the mass matrix, in 1/s.
@@ -262,7 +263,7 @@ pub struct Rotor {
     pub damping: Damping,
     /// Speed Ω, in rad/s.
     pub speed: Coefficient,
-    /// Gravity in -y, in m/s²; zero if it is off.
+    /// Gravity in -y, in m/s²; zero if the model has none.
     pub gravity: Coefficient,
     /// Frame asked for.
     pub frame: Option<Frame>,
@@ -270,7 +271,7 @@ pub struct Rotor {
     pub scale: Option<f64>,
     /// Stations whose radius is an output, besides those with parts.
     pub probes: Vec<usize>,
-    /// Coefficients of bearings over speed, as tables of the model.
+    /// Coefficients of bearings as functions of speed, as tables of the model.
     pub tables: Vec<Table>,
 }
 

@@ -17,7 +17,7 @@ use num_complex::Complex64;
 pub struct Orbit {
     /// x = Re(x e^{iΩt}), in m.
     pub x: Complex64,
-    /// y, likewise.
+    /// y = Re(y e^{iΩt}), in m.
     pub y: Complex64,
 }
 

@@ -1,7 +1,7 @@
-//! Words that other programs, or other places of a file, use for a key.
+//! Unknown keys whose meaning is clear: words of other programs, and keys in the wrong place.
 //!
-//! **Idea.** Where spelling does not lead to the key that is meant, the meaning of the word may: `odes` for `equations`,
-//! or the `range` of a parameter, which belongs to a branch.
+//! **Idea.** Where spelling does not lead to the intended key, the meaning of the word may: `odes` means `equations`,
+//! and the `range` of a parameter belongs to a branch.
 
 /// Words for a key, and the key. All are written in full: abbreviations are recognised by their letters.
 const MEANINGS: [(&[&str], &str); 13] = [

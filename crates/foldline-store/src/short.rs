@@ -5,8 +5,8 @@ use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall, Shown}
 use foldline::explore::{DesignPlan, HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
-/// Returns one message per request of the study that was not fulfilled. Further lines of a message give causes and
-/// cures.
+/// Returns one message for each request of the study that was not fulfilled. Further lines of a message state causes
+/// and remedies.
 ///
 /// A homotopy has arrived as soon as one of its runs has; runs that turned back are part of its search.
 pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {

@@ -38,7 +38,7 @@ impl<'t> Walk<'t> {
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
                 let hint = unquoted(text, &span).unwrap_or_else(|| {
-                    "the file must be TOML: `key = value`, `[table]`, `[[list]]`; texts stand in quotes".to_string()
+                    "the file must be TOML: `key = value`, `[table]`, `[[list]]`; strings are in quotes".to_string()
                 });
                 walk.report(span, error.message(), hint);
                 Err(walk.found)

@@ -166,13 +166,13 @@ class App {
 
   /** Nothing has been computed yet: the texts come first. */
   drafted() {
-    this.diagram.chart.empty.textContent = "Nothing is computed yet. Compute runs the study.";
+    this.diagram.chart.empty.textContent = "Nothing has been computed yet. Compute runs the study.";
     this.notes.open("model");
     this.desk.drafted();
     const { about } = this.run;
     if (about.examples?.length > 0) {
       const show = () => showExamples(this.run, (text) => this.tell(text));
-      byId("pace").after(button("Examples", "Begin with an example", show));
+      byId("pace").after(button("Examples", "Start from an example", show));
       if (!sessionStorage.getItem("begun")) show();
       sessionStorage.setItem("begun", "yes");
     }

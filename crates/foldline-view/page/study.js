@@ -30,10 +30,10 @@ export class Desk {
       },
     });
     const buttons = () => ({
-      go: button("Compute", "Compute what is new", () => this.compute()),
-      drop: button("Discard", "Back to the texts of the run", () => this.discard()),
-      undo: button("Undo", "Show the study without what was added last", () => this.undo()),
-      python: button("Python", "Copy the Python that runs this study", () => this.python()),
+      go: button("Compute", "Compute the changes", () => this.compute()),
+      drop: button("Discard", "Restore the texts of the run", () => this.discard()),
+      undo: button("Undo", "Show the study without its latest addition", () => this.undo()),
+      python: button("Python", "Copy Python code that runs this study", () => this.python()),
       note: make("span", { class: "note", role: "status" }),
     });
     this.rows = [buttons(), buttons()];
@@ -84,7 +84,7 @@ export class Desk {
     const checked = this.editor.checked === this.editor.text && this.modelEditor.checked === this.modelEditor.text;
     const said = this.fixed !== null ? `The texts cannot be changed here: ${this.fixed}`
       : this.busy || !this.changed || mistaken || draft || !this.fresh ? this.said
-      : "Nothing computed so far fits: this starts a run in a new folder and keeps the one shown.";
+      : "The results so far do not fit these texts: Compute again starts a run in a new folder and keeps the one shown.";
     for (const { go, drop, undo, note } of this.rows) {
       go.textContent = draft ? "Compute" : this.fresh && this.changed ? "Compute again" : shorter ? "Remove" : "Compute";
       go.disabled = (!this.changed && !draft) || this.busy || this.fixed !== null || mistaken || !checked;
@@ -115,7 +115,7 @@ export class Desk {
     this.editor.set(found.text, found.lines);
     const [first, last] = found.lines;
     const lines = first === last ? `line ${first}` : `lines ${first} to ${last}`;
-    this.say(`New: ${lines}. Change what you like, then Compute.`);
+    this.say(`New: ${lines}. Edit them if necessary, then Compute.`);
     this.heard.tell(`${found.name}: ${lines} added to the study, not yet computed.`);
   }
 
@@ -130,7 +130,7 @@ export class Desk {
       if (removing) this.before.pop();
       else if (!fresh) this.before.push(before);
       [this.base, this.model] = [text, this.modelEditor.text];
-      this.said = removing ? "Removed." : "The run goes on with this study.";
+      this.said = removing ? "Removed." : "The run continues with this study.";
       this.editor.set(text);
     } catch (error) {
       this.said = error.message;
@@ -149,7 +149,7 @@ export class Desk {
     const last = this.before.at(-1);
     if (last === undefined) return;
     this.editor.set(last);
-    this.say("This is the study without what was added last. Remove deletes its results.");
+    this.say("This is the study without its latest addition. Remove deletes the results of that addition.");
   }
 
   async python() {
@@ -211,12 +211,12 @@ export class Pace {
     const order = (what) => async () => {
       try {
         await from.order(what, {});
-        this.tell(what === "stop" ? "The run stops at its next point." : "The run goes on.");
+        this.tell(what === "stop" ? "The run stops at its next point." : "The run continues.");
       } catch (error) {
         this.tell(error.message);
       }
     };
-    const all = { stop: ["Stop", "Stop the run at its next point"], resume: ["Resume", "Go on with the run"] }[now];
+    const all = { stop: ["Stop", "Stop the run at its next point"], resume: ["Resume", "Continue the run"] }[now];
     this.host.replaceChildren(...(all ? [button(all[0], all[1], order(now))] : []));
   }
 }
@@ -232,8 +232,8 @@ export function showExamples(run, tell) {
       tell(error.message);
     }
   };
-  const list = run.about.examples.map((own, index) => make("li", {}, button(own.name, `Begin with ${own.name}`, () => open(index)), make("span", { text: own.about })));
+  const list = run.about.examples.map((own, index) => make("li", {}, button(own.name, `Start from ${own.name}`, () => open(index)), make("span", { text: own.about })));
   const close = make("button", { type: "button", text: "Close", onclick: () => dialog.close() });
-  dialog.replaceChildren(make("h2", { id: "examples-head", text: "Begin with an example" }), make("ul", { class: "examples" }, ...list), make("form", {}, close));
+  dialog.replaceChildren(make("h2", { id: "examples-head", text: "Start from an example" }), make("ul", { class: "examples" }, ...list), make("form", {}, close));
   dialog.showModal();
 }

@@ -1,8 +1,8 @@
 //! The study of a run, and the process that computes it.
 //!
-//! **Idea.** The page requests nothing but a longer study, a shorter one that it had before, and stop or resume. Each is
-//! checked here: the text must be a study of the same model with which the run can go on. It replaces the study file, and
-//! another process of this program computes the rest. That process outlives this one.
+//! **Idea.** The page can request only a longer study, an earlier shorter one, and to stop or resume. Each request is
+//! checked here: the text must be a study of the same model with which the run can go on. It then replaces the study
+//! file, and another process of this program, which outlives this one, computes the rest.
 
 use crate::watch::Watch;
 use foldline_store::diagnostic::Diagnostic;
@@ -15,9 +15,9 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Longest time in which a run reaches its next point and stops, on a computer with much else to do.
+/// Longest time in which a run reaches its next point and stops, on a busy computer.
 const STOPS: Duration = Duration::from_secs(60);
-/// Pause between two looks at a run that is stopping.
+/// Interval between two checks of a run that is stopping.
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// Returns the command that computes the run of a study in a folder; `true` resumes it.
@@ -59,7 +59,7 @@ pub struct Files {
     pub folder: PathBuf,
 }
 
-/// Model and study to begin with.
+/// Example: a model and a study.
 #[derive(Clone, Debug)]
 pub struct Example {
     /// Its name, also that of its folder.
@@ -74,7 +74,7 @@ pub struct Example {
 
 struct Inner {
     files: Mutex<Files>,
-    /// Models to begin with, offered while nothing has been computed.
+    /// Examples, offered while nothing has been computed.
     examples: Vec<Example>,
     program: Program,
     watch: Watch,
@@ -90,7 +90,7 @@ impl Desk {
         Desk::with_examples(files, program, watch, child, Vec::new())
     }
 
-    /// Desk with models to begin with.
+    /// Desk with examples, without a run.
     pub fn with_examples(
         mut files: Files,
         program: Program,
@@ -124,7 +124,7 @@ impl Desk {
         &self.0.examples
     }
 
-    /// Turns to an example, of which nothing is computed or written yet.
+    /// Selects an example, of which nothing is computed or written yet.
     pub(crate) fn example(&self, index: usize) -> Result<(), Refused> {
         let _turn = self.turn();
         let own = self.0.examples.get(index).ok_or_else(|| "there is no such example".to_string())?;
@@ -144,7 +144,7 @@ impl Desk {
     /// Computes a study of a model from the beginning, in a new folder. Both files are written.
     ///
     /// # Errors
-    /// The reason why they cannot be, or the run cannot be started.
+    /// The reason why the files cannot be written or the run cannot be started.
     pub(crate) fn anew(&self, model: &str, text: &str) -> Result<(), Refused> {
         let _turn = self.turn();
         let (own, mut files) = (self.0.watch.study(), self.files());
@@ -193,7 +193,7 @@ impl Desk {
     /// Goes on with a study, longer or shorter than the one so far, `before`.
     ///
     /// # Errors
-    /// The reason why the run cannot go on with it. Nothing has changed then.
+    /// The reason why the run cannot go on with it; nothing is changed in that case.
     pub(crate) fn study(&self, before: &str, text: &str) -> Result<(), Refused> {
         let _turn = self.turn();
         let own = self.0.watch.study();
@@ -263,7 +263,7 @@ impl Desk {
         let start = Instant::now();
         while is_written(folder) {
             if start.elapsed() > STOPS {
-                return Err("the run has been asked to stop but goes on; try again later".to_string().into());
+                return Err("the run was asked to stop but has not stopped yet; try again later".to_string().into());
             }
             std::thread::sleep(PAUSE);
         }

@@ -1,8 +1,8 @@
 //! Order in which the points of a growing run were first seen.
 //!
-//! **Idea.** The file says which positions each branch has. What is new since the last look is appended to a list of
-//! stretches, and the index of a point in this list is its cursor: a client that has N points asks for those from N
-//! on. If anything was removed, as when a run is resumed, the list starts again in a new *epoch*.
+//! **Idea.** The file says which positions each branch has. Positions that are new since the last check are appended to
+//! a list of stretches, and the index of a point in this list is its cursor: a client that has N points asks for those
+//! from N on. If anything was removed, as when a run is resumed, the list starts again in a new *epoch*.
 
 use foldline_store::run_file::Span;
 use std::collections::HashMap;
@@ -54,7 +54,7 @@ impl Log {
         self.stretches.last().map_or(0, |stretch| stretch.first + stretch.points())
     }
 
-    /// Appends what is new. If points have disappeared, begins a new epoch.
+    /// Appends new points. If points have disappeared, begins a new epoch.
     pub(crate) fn grow(&mut self, spans: &[Span]) {
         let kept = |(branch, [low, high]): (&i64, &[i64; 2])| {
             let reach = spans.iter().find(|span| span.number == *branch).and_then(|span| span.reach);

@@ -23,7 +23,7 @@ pub(crate) enum Place {
 
 /// Periods of a torus over which a trajectory is shown.
 const ROUNDS: usize = 40;
-/// Number of places at which an orbit is evaluated, about, for a picture that looks smooth at full screen.
+/// Approximate number of positions at which an orbit is evaluated, enough for a smooth picture at full screen.
 const PLACES: usize = 600;
 /// Number of samples for harmonics.
 const SAMPLES: usize = 512;

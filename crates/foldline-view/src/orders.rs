@@ -1,4 +1,4 @@
-//! Requests of the page that are more than questions: bodies in JSON, and their answers.
+//! Requests of the page that change something or check a text: bodies in JSON, and their answers.
 //!
 //! | path | body | answer |
 //! |---|---|---|

@@ -145,7 +145,7 @@ impl Watch {
         Watch(Arc::new(shared))
     }
 
-    /// Turns to another run, or to another study of which nothing has been computed yet.
+    /// Changes to another run, or to another study of which nothing has been computed yet.
     pub(crate) fn turn_to(&self, folder: &Path, study: Study) {
         let mut growing = self.growing();
         growing.folder = folder.to_path_buf();
@@ -183,7 +183,7 @@ impl Watch {
         self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// The study as the run has it.
+    /// The study as recorded in the run.
     pub fn study(&self) -> Arc<Study> {
         Arc::clone(&self.growing().study)
     }
@@ -246,7 +246,7 @@ impl Watch {
         self.told(&mut growing, state, before)
     }
 
-    /// Completes and keeps a state. Returns true if it is another one than `before`.
+    /// Completes and keeps a state. Returns true if it differs from `before`.
     fn told(&self, growing: &mut Growing, mut state: Value, before: Notice) -> bool {
         state["texts"] = growing.texts.into();
         state["fixed"] = self.why_not().into();

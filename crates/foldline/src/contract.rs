@@ -33,7 +33,7 @@ pub struct Batch<'a> {
     pub signs: &'a [f64],
 }
 
-/// A test function whose sign depends on those of eigenvectors.
+/// Test function whose sign depends on the signs of eigenvectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Turning {
     /// Value.
@@ -68,7 +68,7 @@ pub trait VectorField: Send + Sync {
     /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
 
-    /// True once the run is to end and the field returns NaN, so that no lengthy computation should be started.
+    /// True once the run is ending and the field returns NaN; no lengthy computation should then be started.
     fn ended(&self) -> bool {
         false
     }
@@ -78,8 +78,8 @@ pub trait VectorField: Send + Sync {
         false
     }
 
-    /// The forced field of which this one is the autonomous form whose last two states go round the unit circle once per
-    /// forcing period; `None` for any other field.
+    /// Returns the forced field if this one is its autonomous form, whose last two states traverse the unit circle once
+    /// per forcing period; `None` for any other field.
     fn unclocked(&self) -> Option<&dyn VectorField> {
         None
     }
@@ -158,7 +158,7 @@ pub trait VectorField: Send + Sync {
         0
     }
 
-    /// Sign of the change of its switch at which the state jumps at an event; 0 for both.
+    /// Direction in which the switch of an event must cross zero for the state to jump: 1, -1, or 0 for both.
     fn event_direction(&self, _event: usize) -> f64 {
         0.0
     }
@@ -167,7 +167,7 @@ pub trait VectorField: Send + Sync {
     /// `[n × n]`, `[n × q]` with q = `free.len()`, and `[n]`.
     fn reset(&self, _event: usize, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) {}
 
-    /// The first event that does not allow one of the points; `None` if all are allowed.
+    /// Index of the first event whose condition one of the points violates; `None` if all points are allowed.
     fn forbidden(&self, _at: Batch) -> Option<usize> {
         None
     }
@@ -217,8 +217,8 @@ pub trait VectorField: Send + Sync {
     /// lanes]`; `[i·n × lanes]` and `[i·q × lanes]`, ordered as by [`VectorField::linearise`].
     fn integrands(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 3]) {}
 
-    /// Lets the conditions of a boundary-value problem refer to a solution with these states at its ends, by a change of
-    /// parameters that belong to the conditions alone.
+    /// Makes the conditions of a boundary-value problem refer to a solution with these states at its ends, by changing
+    /// parameters that occur in the conditions only.
     fn refer(&self, _ends: [&[f64]; 2], _parameters: &mut [f64]) {}
 
     /// Estimates `[b]` of the terms that the conditions at the ends neglect; empty if they are exact.
@@ -298,11 +298,11 @@ pub trait ZeroProblem {
     /// Uses `u` as the reference for phase conditions and scales until the next call.
     fn anchor(&mut self, u: &[f64]);
 
-    /// Evaluates F(u): writes n values and leaves the last k of the n + k slots alone. Returns false if f is not finite
-    /// there.
+    /// Evaluates F(u): writes n values and leaves the last k of the n + k slots alone. Returns false if f is not
+    /// finite.
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
 
-    /// Why [`ZeroProblem::residual`] has no value at `u`, where it is not that f is not finite.
+    /// Reason, other than a non-finite f, for which [`ZeroProblem::residual`] has no value at `u`.
     fn obstacle(&self, _u: &[f64]) -> Option<&'static str> {
         None
     }
@@ -322,7 +322,7 @@ pub trait ZeroProblem {
     /// The current mesh; empty for problems without a mesh.
     fn mesh(&self) -> Mesh;
 
-    /// True if the spectrum consists of multipliers, and the unit circle decides on stability.
+    /// True if the spectrum consists of multipliers, so that the unit circle decides stability.
     fn has_multipliers(&self) -> bool {
         !self.mesh().is_empty()
     }
@@ -333,13 +333,13 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
-    /// A solution on another mesh: like [`ZeroProblem::transfer`], but as accurate where the solution is not smooth.
+    /// Carries a solution to another mesh, accurately also where it is not smooth, unlike [`ZeroProblem::transfer`].
     fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
         self.transfer(u, from, to)
     }
 
-    /// The solution between close ones on the current mesh that interpolation with these weights, which add up to 1,
-    /// yields; as accurate where a solution is not smooth.
+    /// Interpolates between close solutions on the current mesh, with weights that add up to 1; accurate also where a
+    /// solution is not smooth.
     fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.unknowns()];
         for (weight, own) in weights.iter().zip(solutions) {
@@ -348,11 +348,11 @@ pub trait ZeroProblem {
         sum
     }
 
-    /// A mesh on which `u` would meet `tolerance`, or `None` if it does on the current one. The last factorisation must
-    /// be one near `u` on the current mesh.
+    /// Returns a mesh on which `u` would meet `tolerance`, or `None` if it does so on the current mesh. The last
+    /// factorisation must have been near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
 
-    /// A mesh with fewer intervals, if fewer than half of them suffice for `tolerance`. The conditions are those of
+    /// Returns a mesh with fewer intervals, if fewer than half suffice for `tolerance`. The requirements are those of
     /// [`ZeroProblem::better_mesh`].
     fn coarser_mesh(&self, _u: &[f64], _tolerance: f64) -> Option<Mesh> {
         None
@@ -377,7 +377,8 @@ pub trait ZeroProblem {
     }
 
     /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus. `spectrum` is the result
-    /// of [`ZeroProblem::examine`] there. The last factorisation must be one near `u` on the current mesh, and is kept.
+    /// of [`ZeroProblem::examine`] there. The last factorisation must have been near `u` on the current mesh, and is
+    /// kept.
     fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[Complex64]) -> f64 {
         f64::NAN
     }
@@ -404,14 +405,15 @@ pub trait ZeroProblem {
         None
     }
 
-    /// Holds the branch of a switched field that is in force at `u`, or on a switching surface the one that `along`
-    /// leads to, until [`ZeroProblem::cross`]. False if the problem does not do that.
+    /// Fixes the branch of a switched field that is in force at `u` (on a switching surface, the one to which `along`
+    /// leads) until [`ZeroProblem::cross`]. Returns false if the problem does not support this.
     fn hold_branch(&mut self, _u: &[f64], _along: &[f64]) -> bool {
         false
     }
 
-    /// At a solution on a switching surface: takes the branch of f on its other side, and returns the unit tangent
-    /// there that leads away from the surface. `None`, without any change, if the problem holds no branch or f jumps.
+    /// At a solution on a switching surface, changes to the branch of f on the other side and returns the unit tangent
+    /// there that leads away from the surface. Returns `None` and changes nothing if the problem has fixed no branch or
+    /// f jumps.
     fn cross(&mut self, _u: &[f64], _along: &[f64], _switch: usize) -> Option<Vec<f64>> {
         None
     }
@@ -440,11 +442,11 @@ pub trait ZeroProblem {
 /// Level of detail at which a point is computed, besides its solution and parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sight {
-    /// With its tangent.
+    /// The point and its tangent.
     Tangent,
-    /// With its tangent and spectrum.
+    /// The point, its tangent and its spectrum.
     Stability,
-    /// With everything that a stored point contains.
+    /// Everything that a stored point contains.
     Everything,
 }
 
@@ -456,12 +458,13 @@ pub struct Separate<'m> {
     pub values: [f64; 2],
 }
 
-/// Events that a monitor which tells them apart sees between two points.
+/// Events between two points, from a monitor that distinguishes them.
 #[derive(Default)]
 pub struct Events<'m> {
-    /// The events that both ends show.
+    /// Events that are apparent at both points.
     pub seen: Vec<Separate<'m>>,
-    /// Shares of the way at which a value may have passed zero and be about to return.
+    /// Positions between the points, as fractions of their distance, at which a value may have passed zero before it
+    /// returns.
     pub turns: Vec<f64>,
 }
 
@@ -503,18 +506,18 @@ pub trait Monitor: Send + Sync {
         None
     }
 
-    /// Words for a located event; `forwards` is false if it was passed towards smaller positions.
+    /// Description of a located event; `forwards` is false if it was passed towards smaller positions.
     fn remark(&self, _at: &Point, _forwards: bool) -> String {
         String::new()
     }
 
-    /// Two events of one kind with the same label at one place are one event.
+    /// Label that identifies the event: two events of one kind with equal labels at one point are the same event.
     fn label(&self) -> usize {
         0
     }
 
-    /// A function with the zero of the value that is smooth along the branch, also where eigenvalues or multipliers meet
-    /// and become complex; `None` if the value itself is meant.
+    /// A function with the zero of the value that is smooth along the branch, also where eigenvalues or multipliers
+    /// meet and become complex; `None` if the value itself is to be used.
     fn smooth(&self, _at: &Point) -> Option<f64> {
         None
     }
@@ -529,8 +532,8 @@ pub trait Monitor: Send + Sync {
     /// Change in the number of unstable eigenvalues or multipliers at an event of this kind.
     fn jump(&self) -> usize;
 
-    /// Number of events of this kind that account for the unstable eigenvalues or multipliers at `at`. `None` if events
-    /// of another kind change the same ones.
+    /// Number of events of this kind that account for the unstable eigenvalues or multipliers at `at`; `None` if events
+    /// of another kind can change the same eigenvalues or multipliers.
     fn passed(&self, _at: &Point) -> Option<usize> {
         None
     }
@@ -541,8 +544,7 @@ pub trait Monitor: Send + Sync {
         None
     }
 
-    /// The way in which the branch ends at a located event, if it does. `parameter` is the continuation parameter
-    /// there.
+    /// Ending of the branch at a located event, if the event ends it. `parameter` is the continuation parameter there.
     fn ending(&self, _at: &Point, _parameter: f64) -> Option<Ending> {
         None
     }
@@ -589,10 +591,10 @@ pub trait Condition {
     /// Moves to another mesh.
     fn set_mesh(&mut self, mesh: &Mesh);
 
-    /// Evaluates g. Returns false if its values are not finite there.
+    /// Evaluates g. Returns false if its values are not finite.
     fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
 
-    /// Why [`Condition::evaluate`] has no value at these extra unknowns, where it is not that g is not finite.
+    /// Reason, other than a non-finite g, for which [`Condition::evaluate`] has no value at these extra unknowns.
     fn obstacle(&self, _extra: &[f64]) -> Option<&'static str> {
         None
     }
@@ -654,7 +656,7 @@ pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
 
-    /// True once the run is to end immediately, even in the middle of a point. Called very often and from every thread.
+    /// True once the run must end immediately, even in the middle of a point. Called very often and from every thread.
     /// No event is reported after that, because computations in progress return wrong numbers.
     fn stopping(&self) -> bool {
         false

@@ -1,9 +1,7 @@
 //! Numerical continuation and bifurcation analysis of ordinary differential equations.
 //!
-//! **Idea.** A bifurcation diagram is a set of curves of equilibria and of cycles (periodic orbits). Each point comes
-//! with its
-//! stability and an estimate of its accuracy, and every bifurcation between two points is located. This crate computes
-//! such
+//! **Idea.** A bifurcation diagram is a set of curves of equilibria and of cycles (periodic orbits). Each point has a
+//! known stability and an estimated accuracy, and the bifurcations between points are located. This crate computes such
 //! diagrams. It contains only the mathematics: no files, no clock, no printing.
 //!
 //! Read it in this order:
@@ -13,7 +11,7 @@
 //! | what must a model, a curve, a monitor provide? | [`contract`] |
 //! | what is the result? | [`diagram`] |
 //! | how is a model written, evaluated, differentiated? | [`model`] |
-//! | which units are there, and how are they converted? | [`units`] |
+//! | which units are known, and how are they converted? | [`units`] |
 //! | how is a trajectory computed? | [`simulation`] |
 //! | … and many on a graphics card? | [`emitted`] |
 //! | which equations define the curve? | [`problem`] |
@@ -24,7 +22,7 @@
 //! | how is a whole diagram assembled? | [`explore`] |
 //! | is it right? | [`verify`] |
 //! | how does it depend on every parameter? | [`sensitivity`] |
-//! | what is it in other units? | [`converted`] |
+//! | what are the results in other units? | [`converted`] |
 
 pub mod attractors;
 pub mod continuation;

@@ -1,4 +1,4 @@
-//! `foldline campbell`: natural frequencies and damping over the speed.
+//! `foldline campbell`: natural frequencies and damping as functions of the speed.
 
 use super::{Loaded, load, scale, uncomputed, usual_count};
 use crate::arguments::{Campbell as Typed, Frame};
@@ -33,7 +33,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Damped frequency in the frame asked for, in rad/s; negative for backward whirl in the rotating frame.
+/// Damped frequency in the requested frame, in rad/s; negative for backward whirl in the rotating frame.
 fn frequency(frame: Frame, mode: &Mode, speed: f64) -> f64 {
     match frame {
         Frame::Fixed => mode.value.im,

@@ -64,7 +64,7 @@ impl Loaded {
     pub fn speeds(&self, typed: &Speeds, count: usize) -> Result<Vec<f64>, Failure> {
         let Some((index, factor)) = self.machine.speed_parameter() else {
             let cure = "write `speed = \"Omega\"` in [rotor] and give Omega under [parameters]";
-            return Err(Failure::typed("the speed of the rotor is not a parameter, so that it cannot vary", cure));
+            return Err(Failure::typed("the speed of the rotor is not a parameter, so it cannot vary", cure));
         };
         let [low, high] = match &typed.speeds {
             None => [0.0, 2.0 * self.parameters[index]],

@@ -1,4 +1,4 @@
-//! `foldline unbalance-response`: amplitudes over the speed.
+//! `foldline unbalance-response`: amplitudes as functions of the speed.
 
 use super::{Loaded, load, scale, usual_count};
 use crate::arguments::UnbalanceResponse as Typed;

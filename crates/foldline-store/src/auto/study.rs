@@ -29,7 +29,7 @@ pub struct Chosen<'a> {
 
 /// Returns the text of a study in which each solution is a seed from which a branch starts.
 ///
-/// `model_file` is the path of the model as it is to appear in the study. Every solution is checked against the
+/// `model_file` is the path of the model as written in the study. Every solution is checked against the
 /// equations.
 ///
 /// # Errors

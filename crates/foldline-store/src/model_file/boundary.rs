@@ -14,7 +14,7 @@ impl Reader<'_> {
         let own = ["interval", "boundary", "integrals"];
         let first = own.iter().find_map(|key| root.get(*key))?;
         if let (Some(value), true) = (root.get("forcing"), root.contains_key("interval")) {
-            let hint = "keep [interval]: its independent variable stands in the equations like the time";
+            let hint = "keep [interval]: in the equations its independent variable takes the place of the time";
             self.walk.report(value.span(), "the model has both [forcing] and [interval]", hint);
         }
         let mut boundary = Boundary { variable: VARIABLE.into(), ..Boundary::default() };

@@ -1,7 +1,7 @@
 //! Requests to a run in progress to stop, from another process.
 //!
-//! **Idea.** The request is an empty file beside the run file, so it needs neither signals nor the number of the process.
-//! The run removes it when it begins and when it stops.
+//! **Idea.** The request is an empty file beside the run file, so that neither signals nor the process number are
+//! needed. The run removes the file when it begins and when it stops.
 
 use std::path::{Path, PathBuf};
 

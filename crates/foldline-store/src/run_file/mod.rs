@@ -62,9 +62,9 @@ pub enum RunFileError {
     Newer(PathBuf, i64),
     /// A run cannot be resumed because its study or model (named here) has changed.
     Changed(PathBuf, &'static str),
-    /// A run cannot be resumed because its study differs from the one before in more than additions; the text says how.
+    /// A run cannot be resumed because its study has other changes than additions; the text says which.
     Different(PathBuf, String),
-    /// The run is complete and cannot be resumed because part of its profiles were removed.
+    /// The run is complete and cannot be resumed because some of its profiles were removed.
     Thinned(PathBuf),
     /// The file is inconsistent; the text says where.
     Damaged(PathBuf, String),

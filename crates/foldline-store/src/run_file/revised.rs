@@ -1,7 +1,7 @@
-//! Runs whose study has become longer, or shorter again.
+//! Runs whose study was lengthened, or shortened again.
 //!
-//! **Idea.** A longer study is recorded in place of the one before, which stays in `meta` under `study 1`, `study 2`, …
-//! Removing the last requests of a study removes their results. Nothing else in the file changes.
+//! **Idea.** A longer study replaces the one before, which stays in `meta` under `study 1`, `study 2`, … Removing the
+//! last requests of a study removes their results. Nothing else in the file changes.
 
 use super::meta::description;
 use super::reader::{Open, open};
@@ -77,10 +77,10 @@ pub(super) fn scales(connection: &Connection, study: &Study) -> Option<Vec<f64>>
     study.model.states.iter().map(|state| scales.get(&state.name)?.as_f64()).collect()
 }
 
-/// Checks that a run could go on with `study`, without changing it. Returns what the study adds.
+/// Checks whether a run could go on with `study`, without changing the run. Returns the requests that the study adds.
 ///
 /// # Errors
-/// If the file cannot be read, or the reason why it could not.
+/// If the file cannot be read, or if the run could not go on with the study; the error then states the reason.
 pub fn could_resume(folder: &Path, study: &Study) -> Result<Added, RunFileError> {
     let path = path_in(folder);
     let connection = run(&path, false)?;

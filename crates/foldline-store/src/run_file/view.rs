@@ -1,8 +1,8 @@
 //! Reading of a run that may be growing, a few rows at a time.
 //!
-//! **Idea.** A viewer asks again and again what is new. It opens the file for each question and closes it at once: a
-//! reader that stays connected keeps the log of the run from being folded into the file. Positions on a branch are
-//! contiguous, so the range of positions of every branch says what there is, and costs two look-ups in an index.
+//! **Idea.** A viewer asks again and again for new points. It opens the file for each question and closes it at once,
+//! because a reader that stays connected prevents the log of the run from being merged into the file. Positions on a
+//! branch are contiguous, so that their first and last values, two look-ups in an index, determine its points.
 
 use super::bytes::unpack_pairs;
 use super::reader::{special_in, special_order};
@@ -30,7 +30,7 @@ pub struct Span {
 
 /// True if a run in this folder is being written.
 ///
-/// A file system without locks counts as one on which nothing is written.
+/// On a file system without locks, no run counts as being written.
 pub fn is_written(folder: &Path) -> bool {
     let Ok(file) = File::open(folder.join("run.lock")) else { return false };
     matches!(file.try_lock_shared(), Err(std::fs::TryLockError::WouldBlock))

@@ -20,9 +20,9 @@ use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
 /// Observer that writes all events to the run file.
 ///
-/// Threads rarely wait for each other. A thread that finds another one writing leaves its points to it and continues,
-/// unless sixteen points and special points of its branch are already queued or being written. When no call of
-/// [`Observer::observe`] is in progress, everything observed is in the file.
+/// Threads rarely wait for each other. A thread that finds another one writing leaves its points to that thread and
+/// continues, unless sixteen points and special points of its branch are already queued or being written. When no call
+/// of [`Observer::observe`] is in progress, everything observed is in the file.
 ///
 /// If writing fails, for example because the disk is full, every branch is asked to stop; [`Recorder::finish`] then
 /// returns the reason.
@@ -121,7 +121,7 @@ pub(super) fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
     Err(RunFileError::Busy(path_in(folder)))
 }
 
-/// Folds the log into the file and removes it, unless another program stays connected. A viewer connects for a few
+/// Merges the log into the file and removes it, unless another program stays connected. A viewer connects for a few
 /// milliseconds at a time.
 fn remove_log(connection: &Connection) {
     for _ in 0..TRIES {
@@ -171,8 +171,8 @@ impl Recorder {
     }
 
     /// Continues the run in `folder`, or begins one if there is none. Returns the recorder and the diagram found so
-    /// far. Sides that ended only because the run was stopped are open again. The study may have more at its end than the
-    /// one with which the run began, and is recorded then.
+    /// far. Sides that ended only because the run was stopped are open again. The study may have further requests at
+    /// its end, compared with the one with which the run began; the new study is then recorded.
     pub fn resume(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
         let path = path_in(folder);
         if !path.exists() {

@@ -249,8 +249,7 @@ fn below(walk: &mut Walk, value: &Value, model: &Model) -> Option<Wanted> {
     Some(Wanted::Below(Level { quantity: found, value: bound, name: key.get_ref().to_string() }))
 }
 
-/// Reports questions about boundary-value problems and models with events, whose solutions are not followed in two
-/// parameters.
+/// Reports design questions about a kind of model (`what`) for which they are not supported.
 pub(super) fn refuse(walk: &mut Walk, root: &DeTable, what: &str) {
     for (span, _) in walk.tables(root, "design") {
         let message = format!("design questions are not supported for {what}");

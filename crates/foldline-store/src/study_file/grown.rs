@@ -1,7 +1,7 @@
 //! Comparison of a study with an earlier version of it.
 //!
-//! **Idea.** A run may go on with a longer study if nothing that was computed would be different: what the earlier study
-//! requests comes first and unchanged, except that branches may switch at further special points.
+//! **Idea.** A run may go on with a longer study if every result computed so far would stay the same: the requests of
+//! the earlier study come first and are unchanged, except that branches may be switched at further special points.
 
 use super::Study;
 use foldline::diagram::Kind;
@@ -12,8 +12,8 @@ use foldline::explore::{BranchPlan, Plan, Switching};
 pub struct Added {
     /// Names of branches, curves, homotopies, explorations, surveys, sweeps and design questions.
     pub items: Vec<String>,
-    /// Branches that are switched to further on: the name of the parent, the kind of the special points, and the number
-    /// of one of them if not all are meant.
+    /// Further switching: the name of the parent branch, the kind of the special points, and the number of one of them
+    /// if not all are meant.
     pub switched: Vec<(String, Kind, Option<usize>)>,
 }
 
@@ -75,7 +75,7 @@ fn first<T>(
     Ok(new[old.len()..].iter().map(|own| name(own).clone()).collect())
 }
 
-/// Kinds and single points that either switching names.
+/// Kinds and single points that at least one of the two names.
 fn named(a: &Switching, b: &Switching) -> Vec<(Kind, Option<usize>)> {
     let kinds = a.depth.iter().chain(&b.depth).map(|(kind, _)| (*kind, None));
     let points = a.only.iter().chain(&b.only).map(|(kind, number, _)| (*kind, Some(*number)));

@@ -70,12 +70,12 @@ fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f
     Some(targets)
 }
 
-/// Reads the parameter that may vary on the way; it must not have a target value.
+/// Reads the parameter that may vary along the path; it must not have a target value.
 fn via(walk: &mut Walk, item: &Item, model: &Model, targets: Option<&[(usize, f64)]>) -> Option<usize> {
     let aimed = |index: usize| targets.is_some_and(|targets| targets.iter().any(|(target, _)| *target == index));
     let other = model.parameters.iter().enumerate().find(|(index, _)| !aimed(*index));
     let Some(value) = item.table.get("via") else {
-        let message = "this homotopy has no `via`, the parameter that it may vary on the way";
+        let message = "this homotopy has no `via`, the parameter that it may vary along the path";
         let right = match other {
             Some((_, other)) => format!("add a line such as `via = \"{}\"`, and its `range`", other.name),
             None => "every parameter of the model is part of the goal; remove one from `to` and use it for `via`"

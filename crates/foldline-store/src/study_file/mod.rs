@@ -61,8 +61,8 @@ pub struct Study {
     pub uncertainty: bool,
 }
 
-/// Points of cycles whose profiles are kept in the run file when the run is complete. Special points and the ends of
-/// branches always keep theirs, and every point keeps its numbers.
+/// Points of cycles whose profiles stay in the run file when the run is complete. Special points and the ends of
+/// branches always keep their profiles, and every point keeps its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Store {
     /// Every point.
@@ -143,8 +143,8 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
     })
 }
 
-/// Reads the texts of a run. Unlike [`parse_study`], accepts inconsistent units, because earlier versions did not check
-/// them.
+/// Reads the texts of a run. Unlike [`parse_study`], it accepts inconsistent units, because earlier versions did not
+/// check them.
 pub fn parse_study_of_run(
     text: &str,
     file: &str,
@@ -162,8 +162,8 @@ pub fn parse_study_of_run(
 }
 
 impl Study {
-    /// Returns the study with other limits on trajectories. They become part of its text, so that the run records them.
-    /// `time` is a number, or a number with a unit.
+    /// Returns the study with other limits on trajectories. The limits become part of its text, so that the run records
+    /// them. `time` is a number, or a number with a unit.
     ///
     /// # Errors
     /// The mistakes in the limits.
@@ -303,8 +303,8 @@ fn one_forcing(walk: &mut Walk, root: &DeTable) {
     }
 }
 
-/// Reports what does not exist for a boundary-value problem: whatever needs motions from initial states, or curves in
-/// two parameters, which are not followed yet.
+/// Reports requests that do not apply to a boundary-value problem: whatever needs motions from initial states, and
+/// curves in two parameters, which are not followed for such problems.
 fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
     if model.second_phase().is_some() {
         return one_forcing(walk, root);
@@ -338,7 +338,7 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
     }
 }
 
-/// Reports what does not exist for a model with events.
+/// Reports requests that are not supported for a model with events.
 fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
     let events = model.event_count();
     if events == 0 {

@@ -15,7 +15,7 @@ pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
 pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize) -> Option<Cycle> {
     if model.iterated() {
         let hint = "give one iterate and their number, as in `state = { x = 0.5 }` with `periods = 3`";
-        walk.report(value.span(), "the model is a map, whose seeds are no cycles in time", hint);
+        walk.report(value.span(), "the model is a map, whose seeds cannot be cycles in time", hint);
         return None;
     }
     if model.forced() {

@@ -80,7 +80,8 @@ impl<'a> Samples<'a> {
 
     /// Frequencies of the strongest lines between 0 and 1/2, at most `most`, the strongest first.
     pub(super) fn lines(&self, most: usize) -> Vec<f64> {
-        /// Widths of the main lobe of the weights, on both sides of zero, in which no line can be told from the mean.
+        /// Widths of the main lobe of the weights, on both sides of zero, within which a line cannot be distinguished
+        /// from the mean.
         const LOBE: usize = 5;
         let (count, parts) = (self.count(), self.weighted());
         let mut power = vec![0.0; count];

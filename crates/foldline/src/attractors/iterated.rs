@@ -194,7 +194,7 @@ impl Iteration<'_> {
     fn recognised(&self, response: &mut Response) {
         if self.field.periods().iter().any(|period| period.is_finite()) {
             response.recognition.reason =
-                "quasi-periodic motion and chaos of maps with angles are not told apart".into();
+                "quasi-periodic motion and chaos of maps with angles are not distinguished".into();
             return;
         }
         let limits = Limits { steps: self.limit, ..Limits::patient() };

@@ -20,7 +20,7 @@
 //! A second set of modules simulates without solving any equation for the motions it finds (`brute_force`, `settling`,
 //! `runner`, `measure`), for comparison with branches.
 //!
-//! Motions that neither rest nor repeat are told apart as tori, locked cycles and chaos (`recognition`); a torus so found
+//! Motions that neither rest nor repeat are classified as tori, locked cycles or chaos (`recognition`); a torus so found
 //! may start a branch (`wandering`).
 //!
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts
@@ -200,12 +200,12 @@ pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, 
     survey_at(field, parameters, sampling, polish, (Pace::THOROUGH, &|_| false))
 }
 
-/// Samples attractors like [`survey`], but no further than needed: the survey ends in a block of 16 samples as soon as
-/// at least half of them have settled, or else at the end of the block, if `enough` accepts the attractors that count
-/// as reached. Those are the solutions on which samples were observed to settle and, once half of the block has
-/// settled, a solution that is the only known equilibrium, or the only known cycle, and clearly attracts by its
-/// spectrum. They depend on the order of the samples, not on the number of threads. Trajectories are integrated to a
-/// relative accuracy of 1e-5 instead of 1e-6.
+/// Samples attractors like [`survey`], but stops as soon as `enough` accepts the attractors that count as reached: in a
+/// block of 16 samples once at least half of them have settled, or else at the end of the block. Those are the
+/// solutions on which samples were observed to settle and, once half of the block has settled, a solution that is the
+/// only known equilibrium, or the only known cycle, and clearly attracts by its spectrum. They depend on the order of
+/// the samples, not on the number of threads. Trajectories are integrated to a relative accuracy of 1e-5 instead of
+/// 1e-6.
 pub fn survey_until(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -216,11 +216,11 @@ pub fn survey_until(
     survey_at(field, parameters, sampling, polish, (Pace::BRIEF, enough))
 }
 
-/// Samples attractors like [`survey`], for so many initial states that most go to attractors that others have found:
-/// maps of basins. The first few thousand are observed as in a survey; they should be spread over all. Later ones are
-/// compared with the known attractors only, and observed from half of their steps on if that does not settle them. They
-/// count as settled at the largest distance, for each attractor, at which no decision about the first ones would have
-/// been wrong; one in 64 is followed further to check that ([`Census::early`]).
+/// Samples attractors like [`survey`], for maps of basins: there are so many initial states that most lead to
+/// attractors already found. The first few thousand are observed as in a survey; they should be spread over all. Later
+/// ones are compared with the known attractors only, and observed from half of their steps on if that does not settle
+/// them. They count as settled at the largest distance, for each attractor, at which no decision about the first ones
+/// would have been wrong; one in 64 is followed further to check that ([`Census::early`]).
 pub fn survey_map(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
     survey_at(field, parameters, sampling, polish, (Pace::MAP, &|_| false))
 }

@@ -1,4 +1,4 @@
-//! Quasi-periodic motion, locked cycles and chaos told apart by one trajectory.
+//! Quasi-periodic motion, locked cycles and chaos, distinguished by means of one trajectory.
 //!
 //! **Idea.** A trajectory that neither comes to rest nor repeats itself is observed at equal intervals: the forcing
 //! period or, without forcing, the period of its strongest spectral line. From N such states follow the rotation number
@@ -18,9 +18,9 @@
 //!                               |λ| ≤ 3 ε or |λ| N ≤ 1/2
 //! ```
 //!
-//! A motion that locks to p/q has ρ = p/q exactly, and so fails (3) whatever else it does. λ is a weighted average over
-//! eight parts of the record, and ε three times the standard error of their mean. δ is at least ten times the accuracy of the
-//! integration.
+//! A motion that locks to p/q has ρ = p/q exactly, and so fails (3) whatever else it does. λ is the mean of weighted
+//! averages over the last seven of eight parts of the record, and ε is three times the standard error of this mean. δ
+//! is at least ten times the accuracy of the integration.
 //!
 //! **Source.** das2017 (weighted averages), laskar1999 (frequencies), benettin1980 (exponents).
 //!
@@ -364,7 +364,7 @@ impl Watch<'_> {
             _ if error > KNOWN => format!("its rotation number is known to {error:.0e} only"),
             _ if near.is_some() => {
                 let (p, q) = near.unwrap_or_default();
-                format!("its rotation number cannot be told from {p}/{q}, at which it may lock to a cycle")
+                format!("its rotation number cannot be distinguished from {p}/{q}, at which it may lock to a cycle")
             }
             _ if change > STEADY => {
                 format!("it still changes, by {change:.0e} of its amplitude over half of the record")

@@ -1,10 +1,10 @@
 //! A first torus from a quasi-periodic motion.
 //!
-//! **Idea.** Samples are integrated until one of them neither rests nor repeats itself and is recognised as quasi-periodic
-//! (`recognition`). Trajectories from equally spaced points of its section are the first torus, from which Newton's method
-//! starts.
+//! **Idea.** Samples are integrated until one of them neither rests nor repeats itself and is recognised as
+//! quasi-periodic (`recognition`). Trajectories from equally spaced points of its section are the first torus, from
+//! which Newton's method starts.
 //!
-//! **Fails when** the torus does not attract.
+//! **Fails when** the torus is not attracting.
 
 use super::driven::{Driven, with_clock, with_unit_scales};
 use super::recognition::{Nature, Quasi, recognise};
@@ -83,7 +83,7 @@ pub fn first_torus(
     let why = reasons.first().map(|why| format!(", the first because {why}")).unwrap_or_default();
     Err(format!(
         "no quasi-periodic motion was reached: of {tried} samples {settled} came to rest or to a cycle, {chaotic} to chaos, \
-         {escaped} escaped, and {} could not be told{why}",
+         {escaped} escaped, and {} were undecided{why}",
         reasons.len()
     ))
 }

@@ -1,8 +1,8 @@
 //! Limit on the work of one side of a branch.
 //!
 //! **Idea.** Factorisations on a mesh are charged to an allowance, and every accepted point restores part of it. A few
-//! hard points may use what easy points have left over; a branch on which every point is hard ends. The work of a side
-//! is therefore bounded by the allowance and the number of points.
+//! hard points may use work that easy points saved; a branch on which every point is hard ends. The work of a side is
+//! therefore bounded by the allowance and the number of points.
 //!
 //! A side also ends after several consecutive points with unexplained changes of stability. If multipliers lie on the
 //! unit circle along the whole branch, rounding changes the number of unstable ones, and special points found there are

@@ -20,7 +20,7 @@ pub enum Failure {
     Blocked(&'static str),
     /// The iteration did not converge; sizes of the updates.
     NoConvergence(Vec<f64>),
-    /// The point does not continue the branch: the tangent turns by `angle`, or the prediction was off by the share
+    /// The point does not continue the branch: the tangent turns by `angle`, or the prediction missed by the fraction
     /// `miss` of the step.
     Elsewhere {
         /// Angle in radians.
@@ -28,16 +28,16 @@ pub enum Failure {
         /// Distance from the prediction, relative to the step.
         miss: f64,
     },
-    /// Midway, the curve lies too far from the cubic between both ends: `miss` times the permitted distance, which is
-    /// the share `allowed` of the step.
+    /// The midpoint of the curve lies too far from the cubic between both ends: at `miss` times the permitted distance,
+    /// which is the fraction `allowed` of the step.
     Bent {
         /// In units of the permitted distance.
         miss: f64,
         /// Relative to the step.
         allowed: f64,
     },
-    /// Taken backwards, the step misses its start by the share `miss` of the step: another branch, or the other
-    /// side of a cusp, is close.
+    /// The reverse step misses the start by the fraction `miss` of the step: another branch, or the other side of a
+    /// cusp, is close.
     NotBack {
         /// Relative to the step.
         miss: f64,
@@ -108,7 +108,7 @@ pub struct Station {
     pub tangent: Vec<f64>,
     /// The mesh of `point`, `u` and `tangent`.
     pub mesh: Mesh,
-    /// A finer mesh for the next step, if `mesh` leaves no room.
+    /// A finer mesh for the next step, if the error on `mesh` is too close to the tolerance.
     pub roomier: Option<Mesh>,
     /// Share of the tolerance to which the mesh of the next point is adapted: less than 1 if the multipliers need a
     /// finer mesh than the profile.

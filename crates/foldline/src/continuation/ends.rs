@@ -8,7 +8,7 @@ use super::step::Step;
 use crate::contract::Monitor;
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint, Symmetry};
 
-/// Share of the deviation from simpler solutions below which a step is rejected: it may have landed on them, and its
+/// Fraction of the deviation from simpler solutions below which a step is rejected: it may have landed on them, or its
 /// side of the meeting point is uncertain.
 const LITTLE: f64 = 0.25;
 /// Share of the deviation below which a point close to the meeting point counts as beyond it.
@@ -18,7 +18,7 @@ const NOTHING: f64 = 0.05;
 const HOME: f64 = 30.0;
 /// Distance from the start, in tolerances, beyond which a branch can return to it.
 const AWAY: f64 = 100.0;
-/// Step above which a failed check for closure makes the step be retried with half its length.
+/// Step above which a failed check for closure causes a retry with half the length.
 const DIVISIBLE: f64 = 1e-3;
 
 /// Closure detector: state of a run with respect to its start.

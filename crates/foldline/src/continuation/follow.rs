@@ -1,8 +1,8 @@
 //! Continuation of one side of a branch, from one accepted point to the next.
 //!
-//! **Idea.** One loop: predict with the tangent and its change, correct, judge the step by the angle between tangents,
-//! clip it at the bounds, check whether the branch ends, look for special points in between, emit, choose the next step
-//! size.
+//! **Idea.** One loop: predict with the tangent and its change, correct, accept or reject the step by the angle between
+//! tangents, clip it at the bounds, check whether the branch ends, search for special points in between, emit, choose
+//! the next step size.
 
 use super::Settings;
 use super::allowance::{Allowance, work};
@@ -28,7 +28,7 @@ pub struct Follow<'w> {
     pub problem: &'w mut dyn ZeroProblem,
     /// Settings of the run.
     pub settings: &'w Settings,
-    /// Monitors of the special points to look for.
+    /// Monitors of the special points to locate.
     pub monitors: &'w [Box<dyn Monitor + 'w>],
     /// Requested values. They affect nothing but the end of the branch.
     pub marks: &'w [Box<dyn Monitor + 'w>],
@@ -36,7 +36,7 @@ pub struct Follow<'w> {
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
-    /// The end of the run at a point beyond which another problem or another direction is needed.
+    /// Returns the ending at a point beyond which another problem or another direction is needed.
     pub corner: &'w dyn Fn(&Point) -> Option<Ending>,
     /// True if the problem holds a branch of a switched field, so that equilibria are followed through its surfaces.
     pub holds: bool,
@@ -52,7 +52,7 @@ pub struct Follow<'w> {
     pub first_period: Option<f64>,
     /// Closure detector; empty when a run begins.
     pub homecoming: Homecoming,
-    /// Length of the step under inspection. What is significant along it is significant on its parts.
+    /// Length of the step under inspection. A change that is significant over the step is significant on its parts.
     pub inspected: f64,
 }
 
@@ -81,7 +81,7 @@ const CROSSING: f64 = 2e-3;
 
 /// Largest ratio of a step to the previous one, because the predictor is the cubic through both ends of the latter.
 const GROWTH: f64 = 2.0;
-/// Growth of the period beyond which an orbit of infinite period is looked for. Empirical: it saves the search on
+/// Growth of the period beyond which an orbit of infinite period is searched for. Empirical: it saves the search on
 /// ordinary branches and decides nothing, because the cycle itself must show the equilibria.
 const LONG: f64 = 3.0;
 /// Further growth of the period after which the search is repeated. A period grows like the logarithm of the distance
@@ -307,8 +307,8 @@ impl Follow<'_> {
         }
     }
 
-    /// Smallest step. A stop of stiffness k bends a branch within a distance of the order of k⁻², measured in the
-    /// stiffness of the spring, when it is first touched.
+    /// Smallest step. At first contact a stop of stiffness k, relative to that of the spring, bends a branch within a
+    /// distance of order k⁻².
     fn shortest(&self) -> f64 {
         const STIFF: f64 = 1e-3;
         if self.problem.is_switched() { STIFF * self.settings.min_step } else { self.settings.min_step }

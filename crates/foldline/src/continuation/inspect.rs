@@ -1,9 +1,9 @@
 //! Special points between two accepted points.
 //!
 //! **Idea.** Every monitor whose sign differs at the two ends is located. The step is halved recursively while it
-//! contains more than one special point, while the number of unstable multipliers changes by something that the special
-//! point does not explain, or while a monitor bends so much that it may have touched zero and returned. A change of
-//! stability that remains unexplained is recorded as such. Marks take no part in this search: they are located last, on
+//! contains more than one special point, while the number of unstable multipliers changes by an amount that the special
+//! point does not explain, or while a monitor is so curved that it may have touched zero and returned. A change of
+//! stability that remains unexplained is recorded as such. Marks are not part of this search: they are located last, on
 //! the resulting pieces ([`super::marks`]).
 
 use super::allowance::{ALLOWANCE, work};
@@ -531,8 +531,8 @@ impl Follow<'_> {
         [last.0, settled.0]
     }
 
-    /// Narrows an interval between two places, at the first of which the number of unstable eigenvalues or multipliers
-    /// is as asked for, and at the second of which it is not.
+    /// Narrows an interval between two positions; the number of unstable eigenvalues or multipliers equals the given
+    /// one at the first and differs from it at the second.
     fn bisected(
         &mut self,
         stretch: &Stretch,

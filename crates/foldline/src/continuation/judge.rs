@@ -2,7 +2,7 @@
 //!
 //! **Idea.** A corrected point can lie on another branch. It does not continue this one if the tangent turns too far,
 //! if the prediction was far off, if the chord deviates too much from both tangents, or, next to other branches, if the
-//! same step taken backwards does not return.
+//! reverse step does not return.
 
 use super::corrector::{Failure, Plane, Station, correct, correct_within, parameter_row};
 use super::follow::Follow;
@@ -35,7 +35,7 @@ const CHORD_SLACK: f64 = 0.08;
 
 impl Follow<'_> {
     /// Corrects `guess` towards `aim`, on the mesh of `left`, and gives up as soon as the result clearly does not
-    /// continue the branch. The criteria of [`Follow::continues`] are applied with a little slack, before mesh and
+    /// continue the branch. The criteria of [`Follow::continues`] are applied with a small margin, before mesh and
     /// stability are computed. Also returns the row of the hyperplane.
     pub(super) fn corrected(
         &mut self,
@@ -85,9 +85,9 @@ impl Follow<'_> {
         Ok(between)
     }
 
-    /// Checks that the curve follows the cubic between both ends of a step. A wiggle shorter than the step shows at
-    /// neither end. The midpoint is cheap for equilibria, and needed where no previous step shows the bend of the
-    /// curve. It is stored in `right`.
+    /// Checks that the curve follows the cubic between both ends of a step. An oscillation shorter than the step is not
+    /// visible at either end. The midpoint is cheap for equilibria, and needed where no previous step shows the
+    /// curvature. It is stored in `right`.
     pub(super) fn is_smooth(&mut self, left: &Station, right: &mut Station, cost: &mut Cost) -> Result<(), Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let mut looked = |share: f64| -> Result<f64, Failure> {
@@ -164,7 +164,7 @@ impl Follow<'_> {
         before.abs().min(after.abs()) < UNSIGNED || (before * after > 0.0) == forth
     }
 
-    /// Checks that the same step backwards from `right` returns to `left`. Required along bifurcation curves, where the
+    /// Checks that the reverse step from `right` returns to `left`. Required along bifurcation curves, where the
     /// other side of a cusp may be close, and elsewhere if another branch may be.
     pub(super) fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
         let held = !self.settings.stability;

@@ -84,7 +84,7 @@ impl Lines {
 }
 
 impl Follow<'_> {
-    /// Looks for eigenvalues that exchange sides; see the module.
+    /// Searches for eigenvalues that exchange sides; see the module.
     pub(super) fn exchanged(
         &mut self,
         stretch: &Stretch,
@@ -168,16 +168,16 @@ pub(super) struct Around<'p> {
 }
 
 impl Around<'_> {
-    /// Number of eigenvalues whose distance from `centre` vanishes at the located point, as far as its error lets tell: in
-    /// order of size, their zeros along the curve are no farther from it. Those that vanish along the whole curve, as
-    /// with a conserved quantity, do not count.
+    /// Number of eigenvalues whose distance from `centre` vanishes at the located point within its error: in order of
+    /// size, their zeros along the curve are no farther from it. Those that vanish along the whole curve, as with a
+    /// conserved quantity, do not count.
     pub fn vanishing(&self, centre: f64) -> usize {
         /// A factor of safety.
         const ERRORS: f64 = 10.0;
         /// Rounding of a distance along the curve.
         const LEAST: f64 = 1e-11;
-        /// Share of the step beyond which the error of the location tells nothing, and of the change of a multiplier beyond
-        /// which its error does.
+        /// Fraction of the step beyond which the error of the location is uninformative, and fraction of the change of
+        /// a multiplier beyond which its error is.
         const MOST: f64 = 0.1;
         let sorted = |point: &Point| {
             let mut all: Vec<f64> = point.free_spectrum().iter().map(|z| (z - centre).norm()).collect();

@@ -1,8 +1,8 @@
 //! Points with a singular Newton matrix, interpolated from both sides.
 //!
-//! **Idea.** Where two branches cross, Newton's method loses the more digits the closer it comes. On a fine mesh no
-//! digits are left before the bracket is narrow enough. But the branch passes smoothly through the point, so monitor
-//! and unknowns can be interpolated from solutions at four distances around it, none of them close.
+//! **Idea.** Where two branches cross, Newton's method loses more digits the closer it comes to the crossing. On a fine
+//! mesh no digits are left before the bracket is narrow enough. But the branch passes smoothly through the point, so
+//! monitor and unknowns can be interpolated from solutions at four distances around it, none of them close.
 //!
 //! If f switches, distances along the curve are not smooth: they change where a switching passes a node of the mesh, and
 //! with them the tangent. The parameter and the multipliers of the cycle do not depend on the mesh. Branch points of such

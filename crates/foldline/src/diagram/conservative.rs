@@ -1,8 +1,8 @@
 //! Multipliers of forced cycles that are on the unit circle for a structural reason.
 //!
-//! **Idea.** In a conservative system the multipliers come in pairs μ, 1/μ, and those of a stable cycle lie on the unit circle at all
-//! parameter values. On which side they are computed is a matter of rounding: they must neither count as unstable nor be
-//! taken for torus points.
+//! **Idea.** In a conservative system the multipliers come in pairs μ, 1/μ, and those of a stable cycle lie on the unit
+//! circle at all parameter values. Rounding decides on which side of it they are computed, so they must neither count
+//! as unstable nor be taken for torus points.
 //!
 //! **Equations.** With the error ε of the multipliers, the system counts as conservative if all form pairs with
 //!
@@ -12,7 +12,7 @@
 
 use super::{Point, Solution};
 
-/// Largest error with which products tell anything.
+/// Largest error of the multipliers at which their products are significant.
 const KNOWN: f64 = 1e-3;
 
 impl Point {
@@ -32,7 +32,7 @@ impl Point {
         if self.reciprocal_pairs(error).is_some() { error } else { 0.0 }
     }
 
-    /// All multipliers of a forced cycle in pairs with the product 1 (1), if they can be paired so.
+    /// Pairs the multipliers of a forced cycle so that each product is 1 (1); `None` if that is impossible.
     pub(crate) fn reciprocal_pairs(&self, error: f64) -> Option<Vec<[usize; 2]>> {
         let Solution::Cycle(cycle) = &self.solution else { return None };
         let z = &self.spectrum;

@@ -204,7 +204,7 @@ impl Point {
         }
     }
 
-    /// Error of the multipliers as far as it matters: the larger of the two defects. Liouville's is a relative error of
+    /// Significant error of the multipliers: the larger of the two defects. Liouville's is a relative error of
     /// their product; if the smallest multiplier is so small that its digits do not matter, neither do those of the
     /// product.
     pub fn multiplier_defect(&self) -> f64 {
@@ -241,9 +241,9 @@ impl Point {
     /// that are on the unit circle within their errors: in a conservative system they stay there, and the computed side
     /// is meaningless.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
-        /// Error of the multipliers above which their distance from the unit circle means nothing, as near an infinite
-        /// period; and the same where reciprocal pairs show that the system is conservative, which needs an error well
-        /// below 1.
+        /// Error of the multipliers above which their distance from the unit circle is meaningless, as near an infinite
+        /// period. The second value applies where reciprocal pairs show that the system is conservative, which requires
+        /// an error well below 1.
         const UNKNOWN: [f64; 2] = [1e-3, 0.1];
         let error = self.neutral_error();
         let known = error < UNKNOWN[0] || error < UNKNOWN[1] && self.is_conservative();
@@ -324,7 +324,7 @@ impl Point {
 pub(crate) const STANDS: f64 = 1e-9;
 /// Beginning of the remark that states the dimension of a null space.
 pub(crate) const NULL_SPACE: &str = "the null space has dimension ";
-/// Slope below which branch points cannot be told from folds, and a branch may be vertical.
+/// Slope below which branch points cannot be distinguished from folds, and a branch may be vertical.
 pub(crate) const FLAT: f64 = 1e-6;
 
 /// Type of a special point.
@@ -393,9 +393,10 @@ pub enum Kind {
     NeutralSaddle,
     /// On a curve of connecting orbits: two leading eigenvalues meet and become complex (Belyakov).
     DoubleEigenvalue,
-    /// On a curve of connecting orbits: a complex pair and a real eigenvalue lead together.
+    /// On a curve of connecting orbits: a complex pair and a real eigenvalue are equally close to the imaginary axis.
     ThreeLeading,
-    /// On a curve of connecting orbits: the orbit returns outside of the leading eigenspace.
+    /// On a curve of connecting orbits: the orbit returns along the strong stable, or leaves along the strong unstable,
+    /// manifold.
     OrbitFlip,
     /// On a curve of connecting orbits: an invariant manifold returns tangent to an exceptional direction.
     InclinationFlip,

@@ -73,7 +73,7 @@ pub struct Response {
     pub ratio: Option<(u32, u32)>,
     /// Number of periods of its strong lines after which a cycle closes: 2 after a period doubling; 1 if unknown.
     pub multiplicity: u32,
-    /// Smallest and largest value of every state, then of every output: over one period, or over the stretch observed.
+    /// Smallest and largest value of every state, then of every output: over one period, or over the time observed.
     pub ranges: Vec<[f64; 2]>,
     /// Number of starts that settled there. Not a basin fraction: some starts are drawn towards the origin.
     pub hits: usize,
@@ -93,7 +93,7 @@ pub struct Response {
     /// For a map, iterates of the motion: those of one period, or some of a motion that is not periodic; `[count][states
     /// and outputs]`. Empty otherwise, and in files of earlier versions.
     pub iterates: Vec<f64>,
-    /// Evidence for a torus, for chaos, or for a cycle that was recognised as slowly; empty otherwise.
+    /// Evidence for a torus, for chaos, or for a cycle recognised only by the same long observation; empty otherwise.
     pub recognition: Recognition,
 }
 

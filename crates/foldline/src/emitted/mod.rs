@@ -1,8 +1,8 @@
 //! The ensemble of a model as CUDA C source, one trajectory per thread.
 //!
 //! **Idea.** The tapes of a model and the method of [`crate::simulation::Ensemble`] are written as one self-contained
-//! text. Compiled by `nvcc` or at run time it is a kernel for NVIDIA cards; compiled by any C compiler it is a function
-//! that gives the same trajectories on the processor, which is how it is tested.
+//! text. Compiled by `nvcc` or at run time, it is a kernel for NVIDIA cards; compiled by any C compiler, it is a
+//! function that computes the same trajectories on the processor, by which it is tested.
 //!
 //! | part of the text | file |
 //! |---|---|
@@ -11,12 +11,12 @@
 //! | steps, switches, sections, settling | `text/step.c`, `switches.c`, `section.c`, `settle.c` |
 //! | trajectories one after the other | `text/run.c` |
 //!
-//! **Source.** As of [`crate::simulation`] and, for settling, [`crate::attractors`].
+//! **Source.** Those of [`crate::simulation`] and, for settling, of [`crate::attractors`].
 //!
-//! **Departures.** On a card, products and sums are contracted, and step lengths are computed in single precision (with
-//! `FL_EXACT_CONTROL` as on the processor): step lengths differ in the sixth digit. A stiff trajectory stays with the
-//! explicit pair. A trajectory that begins to slide along a surface ends there, as [`Fate::Slides`]. Trajectories are
-//! compared with known solutions every 16 steps tried instead of accepted.
+//! **Departures.** On a card, products and sums are contracted, and step lengths are computed in single precision
+//! unless `FL_EXACT_CONTROL` is defined: they differ from those on the processor in the sixth digit. A stiff trajectory
+//! stays with the explicit pair. A trajectory that begins to slide along a surface ends there, as [`Fate::Slides`].
+//! Trajectories are compared with known solutions every 16 steps tried instead of accepted.
 //!
 //! **Fails when** the model is a map.
 

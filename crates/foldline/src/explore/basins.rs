@@ -1,8 +1,8 @@
 //! Basins of attraction: which attractor an initial state leads to.
 //!
-//! **Idea.** Initial states fill a box at random, from which basin fractions are estimated, and a plane section of the
-//! state space at the centres of equal cells, for a picture. All are followed together, so that an attractor is the
-//! same one in both.
+//! **Idea.** Basin fractions are estimated from initial states drawn at random from a box; a picture is made from
+//! initial states at the centres of equal cells of a plane section. All are followed together, so that both refer to
+//! the same list of attractors.
 //!
 //! **Equations.** For k of N states drawn uniformly from the box, the fraction is k / N with Wilson's interval
 //! ([`Share`]).
@@ -25,7 +25,7 @@ pub struct Plane {
     pub ranges: [[f64; 2]; 2],
     /// Number of cells along each.
     pub cells: [usize; 2],
-    /// `[n]` a state in the plane.
+    /// `[n]` a state through which the plane passes.
     pub through: Vec<f64>,
 }
 
@@ -67,12 +67,12 @@ pub struct Basins {
 }
 
 impl Basins {
-    /// Fraction of the box from which states share a fate.
+    /// Fraction of the box whose states have this fate.
     pub fn share(&self, fate: Fate) -> Share {
         share(&self.box_fates, fate)
     }
 
-    /// Fraction of the plane from which states share a fate.
+    /// Fraction of the plane whose states have this fate.
     pub fn part(&self, fate: Fate) -> Share {
         share(&self.plane_fates, fate)
     }

@@ -121,7 +121,7 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
     }
     if census.chattered > 0 {
         let count = census.chattered;
-        parts.push(format!("ended in chatter, where impacts accumulate and lasting contact follows ({count})"));
+        parts.push(format!("ended in chatter, where impacts accumulate and sustained contact follows ({count})"));
     }
     if census.left > 0 {
         parts.push(format!("not needed ({})", census.left));

@@ -588,7 +588,7 @@ fn settled<'s>(
                  equilibrium is clearly a saddle, or use a larger tolerance"
             ));
         }
-        let orbit = start.cycle().ok_or("the orbit is no cycle")?;
+        let orbit = start.cycle().ok_or("the orbit is not a cycle")?;
         let share = share_for(goal, error).max(longest);
         let (orbit, parameters) =
             start.field.lengthened(orbit, &start.point.parameters, share).ok_or("the equilibrium is not hyperbolic")?;

@@ -34,7 +34,7 @@ pub struct Way<'w> {
 }
 
 /// Integrates from `start` `[n]` over a time span, which may run backwards, at these parameters. The trajectory is
-/// recorded at the `wanted` times, in the direction of the span, or at the ends of the steps if there are none.
+/// recorded at the `wanted` times, given in the direction of the span, or at the ends of the steps if there are none.
 pub fn course(
     model: &Model,
     start: &[f64],

@@ -37,7 +37,7 @@ pub struct Crossings {
     pub beginnings: Vec<Beginning>,
     /// Number of directions tried.
     pub directions: usize,
-    /// Their relation to each other.
+    /// Relation of the branches to each other.
     pub sets: Sets,
 }
 
@@ -45,15 +45,17 @@ pub struct Crossings {
 pub enum Sets {
     /// All that were found are isolated.
     Discrete,
-    /// More were found than cubic terms can tell apart, and they form a family, as by a continuous symmetry. One is kept.
+    /// More were found than terms up to the cubic allow, and they form a family, as under a continuous symmetry. One is
+    /// kept.
     Continuous,
-    /// More were found, but they form no family: terms beyond the cubic ones decide which of them exist. One is kept.
+    /// More were found than terms up to the cubic allow, but they form no family: higher terms decide which of them
+    /// exist. One is kept.
     Undecided,
 }
 
 /// Directions tried for each possible branch.
 const TRIES: usize = 8;
-/// Number of times as many directions that are tried if some branch has been reached only once: a bound on the work.
+/// Factor on the number of directions if some branch has been reached only once: a bound on the work.
 const LONGER: usize = 4;
 /// Smallest angle between the lines of two branches, in radians: the order of s² and of the error of a point over s in
 /// (2), at distances s of some 1e-3, with a factor of safety.

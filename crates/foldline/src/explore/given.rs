@@ -1,7 +1,7 @@
 //! Solutions computed elsewhere.
 //!
-//! **Idea.** A profile computed by another program is close to a solution if the models are the same. The residual of
-//! the equations shows whether they are before anything is solved; Newton's method does the rest.
+//! **Idea.** A profile computed by another program is close to a solution if the models agree. The residual of the
+//! equations shows whether they do before anything is solved; Newton's method then corrects the profile.
 
 use super::System;
 use super::growth::{first, polished, problem_of, settings};

@@ -1,17 +1,18 @@
 //! A solution family carried to new parameter values, along a path that is found and reported.
 //!
-//! **Idea.** The direct run may turn back at a fold. Then the following ways are tried in this order until one arrives:
+//! **Idea.** The direct run may turn back at a fold. The following ways are then tried in this order until one reaches
+//! the goal:
 //!
 //! 1. *direct*: all parameters change together, in proportion, at a fixed value of the parameter `via`;
 //! 2. *along the fold*: the fold that turned the run back is continued to the goal;
 //! 3. *moved*: the family is followed in `via`, and the direct run tried from points spread along it;
 //! 4. *along its folds*: every fold met in `via` is continued to the goal;
-//! 5. *halfway*: steps 1 to 4 again from the farthest point that a run has reached, as long as that gains ground;
+//! 5. *halfway*: steps 1 to 4 again from the farthest point that any run has reached, as long as that makes progress;
 //! 6. *one by one*: the parameters change one after the other.
 //!
-//! Every run is a branch of the diagram, every decision a note. If no way arrives, the note reports how far each came:
-//! if two folds of a closed family meet before the goal, it shrinks to a point there and is not connected to anything
-//! beyond.
+//! Every run is a branch of the diagram, every decision a note. If no way reaches the goal, the note reports how far
+//! each came. If two folds of a closed family meet before the goal, the family shrinks to a point there and is not
+//! connected to anything beyond.
 //!
 //! **Source.** The three flows (direct, with runs in the speed, along the fold) are those of akay2024; choosing among
 //! them is ours.

@@ -29,9 +29,9 @@ pub enum SeedSource {
     State(Vec<f64>),
     /// Limit of Newton's method from this cycle.
     Cycle(Cycle),
-    /// The torus that the cycle from this source is, where the forcing does not act yet.
+    /// The cycle from this source as a torus, at parameter values at which the forcing has no effect.
     Torus(Box<SeedSource>),
-    /// The torus on which a quasi-periodic motion lies that simulation meets.
+    /// The torus of a quasi-periodic motion that is found by simulation.
     QuasiPeriodic,
 }
 
@@ -125,7 +125,7 @@ pub struct BranchPlan {
     pub free: usize,
     /// Smallest and largest value of the parameter.
     pub range: [f64; 2],
-    /// Follow only towards this value and stop there (a homotopy run); it lies in `range`.
+    /// If given, the branch is followed only towards this value, which lies in `range`, and stops there.
     pub until: Option<f64>,
     /// Special points at which to switch branches.
     pub switching: Switching,
@@ -157,12 +157,11 @@ pub struct Holds {
 pub struct CurvePlan {
     /// Unique name.
     pub name: String,
-    /// Bifurcation that is continued: a fold, branch point, Hopf, period doubling or torus point.
+    /// Bifurcation or connecting orbit that is continued, such as a fold, a Hopf point or a homoclinic orbit.
     pub hold: Kind,
     /// Name of the branch on which the special point lies: one of the plan, or one switched to from it.
     pub of: String,
-    /// The special point is the one of that kind nearest to this value of the branch's parameter; the first one if
-    /// `None`.
+    /// Value of the branch's parameter that selects the nearest special point of that kind; `None` selects the first.
     pub near: Option<f64>,
     /// A state near the second equilibrium of a connecting orbit that starts from a branch of equilibria.
     pub to: Option<Vec<f64>>,
@@ -170,7 +169,8 @@ pub struct CurvePlan {
     pub free: usize,
     /// Smallest and largest value of the branch's parameter, then of the second parameter.
     pub ranges: [[f64; 2]; 2],
-    /// Follow only towards this value of the second parameter and stop there; it lies in its range.
+    /// If given, the curve is followed only towards this value of the second parameter, which lies in its range, and
+    /// stops there.
     pub until: Option<f64>,
     /// Values to mark, or to stop at.
     pub marks: Vec<Mark>,
@@ -187,7 +187,7 @@ pub struct HomotopyPlan {
     pub start: Start,
     /// Parameters that change together, with their values at the goal.
     pub targets: Vec<(usize, f64)>,
-    /// Index of the parameter in which the family may be moved on the way.
+    /// Index of the parameter in which the family may be followed between runs towards the goal.
     pub via: usize,
     /// Smallest and largest value of that parameter.
     pub range: [f64; 2],
@@ -239,7 +239,7 @@ pub struct SurveyPlan {
     pub random: u64,
 }
 
-/// Simulation at one value of a parameter after the other, each from the last state at the previous value.
+/// Simulation at successive values of a parameter, each started from the last state at the value before.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepPlan {
     /// Unique name.
@@ -263,7 +263,7 @@ pub enum Wanted {
     Below(Level),
 }
 
-/// A design question: the value of one parameter beyond which a condition is met over a range of another one.
+/// A design question: the value of one parameter beyond which a condition is met throughout a range of another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignPlan {
     /// Unique name.
@@ -280,7 +280,7 @@ pub struct DesignPlan {
     pub vary: usize,
     /// Range in which its value is sought.
     pub within: [f64; 2],
-    /// True if the greatest value is sought, below which the condition is met.
+    /// True if the condition is met below the value, and its greatest value is sought.
     pub greatest: bool,
     /// The condition.
     pub wanted: Wanted,
@@ -322,7 +322,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// True if anything starts at a point inside a branch.
+    /// True if any request starts at an inner point of a branch.
     pub fn starts_inside(&self) -> bool {
         let branches = self.branches.iter().map(|branch| &branch.start);
         let homotopies = self.homotopies.iter().map(|homotopy| &homotopy.start);

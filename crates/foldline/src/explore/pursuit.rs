@@ -1,12 +1,12 @@
 //! Distinction between a jump of a sweep and a steep response.
 //!
 //! **Idea.** The motion at one parameter value is solved for and continued as a branch to the next value. If the branch
-//! gets there without turning back and arrives at the motion to which the trajectory settled, the two are one solution.
-//! If it turns back on the way or arrives at another motion, the sweep has jumped. Size alone does not decide: at a
+//! gets there without turning back and arrives at the motion to which the trajectory settled, both motions lie on one
+//! branch. If it turns back before or arrives at another motion, the sweep has jumped. Size alone does not decide: at a
 //! sharp resonance, responses at neighbouring values differ greatly on one branch.
 //!
-//! **Fails when** one of the two motions cannot be solved for or the branch ends on the way; the result is then
-//! unknown.
+//! **Fails when** one of the two motions cannot be solved for or the branch ends before the next value; the result is
+//! then unknown.
 
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};

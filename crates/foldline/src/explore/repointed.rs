@@ -1,11 +1,11 @@
 //! Change of the collocation points in the course of a branch.
 //!
-//! **Idea.** A mode may become fast along a branch, or a fast one may begin to grow. Where the multipliers are doubtful,
-//! or the mesh is large, the collocation points are chosen again; see [`crate::problem::stiffness`]. The branch then
-//! continues from the same solution at the other points. On either side of its start it changes to Radau points at most
-//! once, and to Gauss points at most once.
+//! **Idea.** A mode may become fast along a branch, or a fast one may begin to grow. Where the multipliers are
+//! doubtful, or the mesh is large, the collocation points are chosen again; see [`crate::problem::stiffness`]. The
+//! branch then continues from the same solution at the other points. On either side of its start a branch changes to
+//! Radau points at most once, and to Gauss points at most once.
 //!
-//! **Fails when** Newton's method does not converge at the other points; the branch then goes on at its own.
+//! **Fails when** Newton's method does not converge at the other points; the branch then keeps its points.
 
 use super::System;
 use crate::continuation::corrector::{Plane, Station, settle};

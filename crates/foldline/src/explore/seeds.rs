@@ -556,8 +556,8 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
         Lost::Escaped => "grows without bound".to_string(),
         Lost::Undefined(_) => "leaves the region where the vector field is defined".to_string(),
         Lost::Stuck => "cannot be integrated: the step size becomes too small".to_string(),
-        Lost::Chatter => "ends in chatter: its impacts follow each other ever faster and accumulate; what follows, \
-                          lasting contact, is not computed"
+        Lost::Chatter => "ends in chatter: its impacts follow each other ever faster and accumulate; the sustained \
+                          contact that follows is not computed"
             .to_string(),
     };
     let exit = match lost {

@@ -1,9 +1,9 @@
 //! First connecting orbits between given saddles.
 //!
-//! **Idea.** If the unstable manifold of the first saddle is a curve, each half of it is a trajectory. It passes the second
-//! saddle, and leaves that along the unstable direction to one side or to the other. Between two values of the
-//! parameter with different sides lies a connection, which is bracketed by bisection. If instead the stable
-//! manifold of the second saddle is a curve, the same is done backwards in time.
+//! **Idea.** If the unstable manifold of the first saddle is a curve, each half of it is a trajectory. It passes the
+//! second saddle and leaves it along the unstable direction, to one side or the other. Between two parameter values at
+//! which the sides differ lies a connection, which is located by bisection. If instead the stable manifold of the
+//! second saddle is a curve, the search runs backwards in time.
 //!
 //! **Equations.** With y = x - x_1, H of `problem::connecting`, and the left eigenvector l of the unstable eigenvalue:
 //!
@@ -14,8 +14,8 @@
 //!
 //! **Source.** beyn1990, §5 (starting orbits); kuznetsov2004, §6.
 //!
-//! **Fails when** both manifolds of dimension two or more, or the trajectory passes other saddles so closely that the
-//! sides change within the resolution of the scan.
+//! **Fails when** both manifolds have dimension two or more, or the trajectory passes other saddles so closely that its
+//! side changes within the resolution of the scan.
 
 use super::System;
 use crate::contract::{Parameters, Verdict};

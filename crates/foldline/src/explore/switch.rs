@@ -21,7 +21,7 @@ use std::f64::consts::TAU;
 /// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
 pub const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 
-/// [`DISTANCES`], beginning with those at which the branches can be told apart at the tolerance.
+/// [`DISTANCES`], beginning with those at which the branches differ by more than the tolerance.
 fn distances(tolerance: f64) -> Vec<f64> {
     let least = 2.0 * known::WITHIN * tolerance;
     let mut all = DISTANCES.to_vec();
@@ -31,8 +31,9 @@ fn distances(tolerance: f64) -> Vec<f64> {
     all
 }
 
-/// Returns the start of the branch that bifurcates at `at`, and its type; `None` for kinds at which no branch of
-/// equilibria or cycles does. If several pairs of eigenvalues cross the imaginary axis at once, `pair` selects one.
+/// Returns the start of the branch that bifurcates at `at`, and its type; `None` for kinds of special points at which
+/// no branch of equilibria or cycles bifurcates. If several pairs of eigenvalues cross the imaginary axis at once,
+/// `pair` selects one.
 ///
 /// # Errors
 /// A sentence that says why no point of the other branch was found.
@@ -339,7 +340,7 @@ fn born(
         ));
     }
     let mesh = mesh::uniform(20);
-    let Solution::Equilibrium(x) = &at.point.solution else { return Err("it is no equilibrium".into()) };
+    let Solution::Equilibrium(x) = &at.point.solution else { return Err("it is not an equilibrium".into()) };
     let cycle = Cycle::at_rest(x, TAU / omega, degree, &mesh);
     let scheme = Scheme::at(degree, stiffness::suited(system.field, &system.scales, &at.point.parameters, &cycle));
     let (mut direction, period) = hopf::direction(system.field, &at.point, omega, &system.scales, scheme, &mesh)

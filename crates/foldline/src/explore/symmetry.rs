@@ -20,7 +20,7 @@ use crate::diagram::{Point, Solution};
 use crate::linalg::max_abs;
 use crate::model::null_space;
 
-/// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶
+/// Largest number of states n for which symmetries are searched for. (1) has n² unknowns, so elimination costs n⁶
 /// operations: a million for ten.
 const MOST: usize = 10;
 /// Difference of derivatives, relative to the largest, that counts as rounding: a factor of safety of a million over

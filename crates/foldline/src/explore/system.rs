@@ -12,7 +12,7 @@ use crate::special::harmonics::Signal;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::Unfolded;
 
-/// A vector field with its scales, and a box in which to look for attractors.
+/// A vector field with its scales, and the box that is searched for attractors.
 #[derive(Clone)]
 pub struct System<'a> {
     /// The vector field.
@@ -43,7 +43,7 @@ pub struct System<'a> {
 }
 
 impl<'a> System<'a> {
-    /// Returns the measure for the comparison of its solutions.
+    /// Returns the measure by which solutions of this system are compared.
     pub fn measure(&self) -> Measure<'_> {
         Measure { scales: &self.scales, periods: self.field.periods() }
     }

@@ -1,4 +1,4 @@
-//! Tori that leave a cycle at a torus point, or begin on a cycle on which a forcing does not act yet.
+//! First tori: those born at a torus point, and cycles at parameter values at which the forcing has no effect.
 //!
 //! **Idea.** Near a torus point the torus is the cycle with a small rotating perturbation. A first one is found by Newton's
 //! method at a prescribed amplitude, as for other branches; the parameter follows, on whichever side the torus lies.
@@ -16,7 +16,7 @@ use crate::diagram::{Cycle, Point, Solution, SpecialPoint};
 use crate::problem::torus::{LARGEST, TorusProblem, start};
 use num_complex::Complex64;
 
-/// Why tori of a model cannot be computed, if they cannot.
+/// Reason why the tori of a model cannot be computed; `None` if they can.
 pub fn unsupported(system: &System) -> Option<&'static str> {
     let angles = system.field.periods().iter().any(|period| period.is_finite());
     match system.field {
@@ -87,8 +87,8 @@ fn strong_resonance(z: Complex64) -> Option<u32> {
     (1..=4).find(|order| (z.powu(*order) - 1.0).norm() < CLOSE * f64::from(*order))
 }
 
-/// The torus that a cycle is, at parameters at which the forcing does not act: the cycle is found without forcing, from
-/// the source of the seed.
+/// A cycle as a torus, at parameters at which the forcing has no effect: the cycle is found without forcing, from the
+/// source of the seed.
 ///
 /// # Errors
 /// A sentence that says why there is none.
@@ -125,7 +125,7 @@ pub(super) fn lifted(
     Ok(Point { solution: Solution::Torus(torus), tangent: Vec::new(), ..point })
 }
 
-/// The torus of a quasi-periodic motion that the samples of a seed meet, and what is known of it.
+/// The torus of a quasi-periodic motion reached by the samples of a seed, and what is known of it.
 ///
 /// # Errors
 /// A sentence that says why there is none.

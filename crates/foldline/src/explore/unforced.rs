@@ -1,4 +1,4 @@
-//! A forced field where its forcing does not act, as an autonomous one.
+//! A forced field as an autonomous one, at parameters at which the forcing has no effect.
 //!
 //! **Equations.** With f the change per forcing period T(p): g = f / T at any fixed time.
 //!

@@ -152,7 +152,6 @@ impl<T: Lane> Chain<T> {
     /// Applies the elimination to right-hand sides h `[L × n]`; the last n are then those of the remaining relation.
     /// Subtracts the contribution to the right-hand sides of (2) from `s` `[q]`. The dimensions are passed again, so
     /// that a caller can make them constants.
-    /// knows them can make them constants.
     #[inline(always)]
     pub fn forward(&self, h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
         for j in 1..self.length {

@@ -168,7 +168,7 @@ impl Cyclic {
         x
     }
 
-    /// Solves with the transposed matrix: `z` has the layout of the unknowns, the result that of the rows.
+    /// Solves with the transposed matrix: `z` has the layout of the unknowns, and the result that of the rows.
     pub fn solve_transposed(&self, z: &[f64]) -> Vec<f64> {
         let (n, q, full) = (self.n, self.q, 3 * self.n + self.q);
         let count = self.steps.len() + 1;

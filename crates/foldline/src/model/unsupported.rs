@@ -1,4 +1,4 @@
-//! Answers for problems that are not solved here, and for settings of other programs without a counterpart.
+//! Messages about problems that are not solved here, and about settings of other programs that have no counterpart.
 //!
 //! **Idea.** An unknown key, value or function name may ask for a kind of problem. The answer names it and says what to
 //! do instead, here or with another program.
@@ -32,7 +32,7 @@ const KINDS: [Kind; 15] = [
         &["boundarie", "boundarycondition", "bc", "bvp", "nbc", "nint"],
         "a boundary-value problem is a model with the tables [interval] and [boundary]",
         "give `[interval]` with its `length`, and `[boundary]` with one condition for each state, such as `left = \
-         \"u@0\"`; integral conditions stand under [integrals]",
+         \"u@0\"`; integral conditions belong under [integrals]",
     ),
     (
         &["integralcondition", "integralconstraint", "constraint", "algebraic", "dae"],

@@ -89,7 +89,8 @@ impl Check<'_> {
                     .into()
             }
             None if name.contains('@') && self.source.boundary.is_some() => {
-                "`@0` and `@1` follow the name of a state that is not repeated, and stand only under [boundary]".into()
+                "`@0` and `@1` follow the name of a state that is not repeated, and are allowed only under [boundary]"
+                    .into()
             }
             None if name.contains('@') => {
                 "`@0` and `@1` belong to boundary-value problems: give [interval] with its `length`, and [boundary]"

@@ -1,10 +1,10 @@
 //! Choice of the collocation points of a cycle.
 //!
 //! **Idea.** Gauss points are more accurate, but they do not damp modes that decay within an interval. On N intervals
-//! such a mode keeps the share R(-z)^N of itself over the period, with z = T μ / N, the rate of decay μ, and R as in
-//! [`super::gauss`]; in truth it keeps e^{-T μ}. If z exceeds [`FAST`], Radau points are chosen, which damp every mode
-//! that decays; unless a mode grows within an interval, which they would damp too. A cycle that needs a fine mesh in any
-//! case, as spikes do, has a small z.
+//! such a mode decays to the fraction R(-z)^N over the period, with z = T μ / N, the rate of decay μ, and R as in
+//! [`super::gauss`]; the exact fraction is e^{-T μ}. If z exceeds [`FAST`], Radau points are chosen, which damp every
+//! mode that decays; unless a mode grows within an interval, which they would damp too. A cycle that needs a fine mesh
+//! in any case, as spikes do, has a small z.
 //!
 //! **Equations.** With |R(-z)| ≈ e^{-2 m (m + 1) / z} for z ≫ m², the share left at Gauss points is
 //!

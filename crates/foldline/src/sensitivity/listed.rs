@@ -49,7 +49,7 @@ pub struct Listed<T> {
     pub number: usize,
     /// Its kind.
     pub kind: Kind,
-    /// Index of the parameter of the branch, and its value.
+    /// Index of the parameter of the branch.
     pub free: usize,
     /// Value of that parameter.
     pub at: f64,
@@ -57,7 +57,7 @@ pub struct Listed<T> {
     pub parameters: Vec<f64>,
     /// The result, or the reason why there is none.
     pub found: Result<T, String>,
-    /// True if points of this kind have no derivatives, which is no failure.
+    /// True if points of this kind have no derivatives by their nature, which is not a failure.
     pub expected: bool,
 }
 
@@ -113,7 +113,7 @@ fn listed<T>(
 /// One derivative with all names.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Name of the branch, index of the special point on it, its kind and its parameter value.
+    /// Name of the branch.
     pub branch: String,
     /// Index of the special point on the branch.
     pub number: usize,
@@ -123,7 +123,7 @@ pub struct Entry {
     pub free: String,
     /// Value of that parameter.
     pub at: f64,
-    /// Name, unit and value of the number; empty if the point has no derivatives.
+    /// Name of the number; empty if the point has no derivatives.
     pub quantity: String,
     /// Unit of the number.
     pub unit: String,

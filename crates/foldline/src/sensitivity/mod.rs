@@ -15,15 +15,15 @@
 //!
 //! The derivatives of a single solution follow from the first equation with λ among the p_i.
 //!
-//! A generic change of a model destroys a branch point. With the unfolding F + b d = 0, (1) gives b' as well; the point
-//! persists to first order only if b' = 0 (a symmetry or an invariant solution that p_i respects), and otherwise λ' has no
-//! meaning. Parameters with b' = 0 are checked by a solution at a changed value, at which b must still vanish.
+//! A generic change of a model destroys a branch point. With the unfolding F + b d = 0, (1) gives b' as well. To first
+//! order the point persists only if b' = 0, as where p_i preserves a symmetry or an invariant solution; otherwise λ'
+//! has no meaning. Parameters with b' = 0 are checked by a solution at a changed value, at which b must still vanish.
 //!
 //! **Errors.** Every derivative is computed twice: on the mesh of the solution and on one with 1.5 times as many
-//! intervals. The second is returned. Its error is that of the first divided by 1.5^order, so that the difference bounds
-//! it where the order is at least two. For extremes, whose error depends on where they lie between the nodes, it is the
-//! largest difference of the changing profiles over the mesh intervals about the extremum. Without a mesh the second computation begins elsewhere and has other rounding
-//! errors.
+//! intervals. The second is returned. Its error is that of the first divided by 1.5^order, so that the difference of
+//! both bounds it where the order is at least two. For extremes, whose error depends on where they lie between the
+//! nodes, it is the largest difference of the changing profiles over the mesh intervals about the extremum. Without a
+//! mesh the second computation begins elsewhere and has other rounding errors.
 //!
 //! **Source.** govaerts2000, §4 (bordered extended systems); the elimination for many parameters is ours.
 //!
@@ -68,7 +68,7 @@ pub enum Measured {
     Angle,
     /// The smallest value of a state or output (states first).
     Smallest(usize),
-    /// The largest value of a state or output; at an equilibrium the value.
+    /// The largest value of a state or output; at an equilibrium, its value.
     Largest(usize),
 }
 

@@ -1,8 +1,8 @@
 //! Uncertainty of special points from that of the parameters.
 //!
-//! **Idea.** To first order, the variance of a number is the sum of those that its derivatives give. Where the dependence
-//! is not linear over the spread of the parameters, that is not enough: the defining system is therefore also solved at
-//! sampled parameters, starting from the first-order prediction.
+//! **Idea.** To first order, the variance of a number is the sum of the variances that the parameters contribute
+//! through its derivatives. Where the dependence is not linear over the spread of the parameters, that is not enough;
+//! the defining system is therefore also solved at sampled parameters, starting from the first-order prediction.
 //!
 //! **Equations.** Parameters independent with means m_i and standard deviations s_i, at the values p_i:
 //!
@@ -63,12 +63,13 @@ pub struct Uncertainty {
     pub bands: Vec<Band>,
     /// Number of samples taken.
     pub samples: usize,
-    /// Reasons why samples have no solution, with how many.
+    /// Reasons why samples have no solution, each with the number of such samples.
     pub failed: Vec<(String, usize)>,
 }
 
-/// Returns the uncertainty of a special point if parameters, given by index, have these distributions; the others are
-/// exact. That of the parameter of the branch does not count, because the special point determines it.
+/// Returns the uncertainty of a special point if parameters, given by index, have these distributions and the others
+/// are exact. A distribution of the branch's own parameter has no effect, because the special point determines its
+/// value.
 ///
 /// # Errors
 /// The reason why there is none.

@@ -26,7 +26,7 @@ use crate::problem::gauss::Scheme;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Sections of an interval in which a maximum is looked for.
+/// Number of sections of an interval that are searched for a maximum.
 const SECTIONS: usize = 8;
 /// Largest phase of a harmonic over the part of an interval on which Gauss quadrature is used.
 const TURN: f64 = 1.5;

@@ -3,8 +3,8 @@
 //!
 //! **Idea.** A switch h has local extrema along a cycle. Where one of them passes zero the sequence of switchings
 //! changes: a new contact begins, or the gap between two contacts closes. The number of excursions of h above zero
-//! changes by one there, or by two where a symmetry repeats the event within the period; the extremum next to zero says
-//! how far it is to the event.
+//! changes by one there, or by two where a symmetry repeats the event within the period; the extremum closest to zero
+//! measures the distance to the event.
 //!
 //! Between two points of a branch the extrema are paired in the order of time, so that several events of one switch
 //! within a step are separate zeros of separate functions. Pairs of a maximum and a minimum that exist at one of the
@@ -368,7 +368,7 @@ fn refined(mut t: [f64; 3], mut v: [f64; 3], at: &dyn Fn(f64) -> f64) -> (f64, f
     found
 }
 
-/// Words for what changes at a grazing, in the order of growing positions.
+/// Description of the change at a grazing, in the order of growing positions.
 pub fn described(field: &dyn VectorField, at: &Point) -> String {
     let Solution::Cycle(cycle) = &at.solution else { return String::new() };
     let nearest = (0..field.switch_count())
@@ -388,7 +388,7 @@ pub fn described(field: &dyn VectorField, at: &Point) -> String {
     format!("contacts {before} → {after} at {name} = 0")
 }
 
-/// Words for a boundary equilibrium: the surface, and what becomes of the branch there.
+/// Description of a boundary equilibrium: the surface, and the continuation of the branch there.
 pub fn on_surface(field: &dyn VectorField, at: &Point, becomes: &str) -> String {
     let Solution::Equilibrium(x) = &at.solution else { return becomes.into() };
     let size = |switch: usize| value(field, &at.parameters, x, &[], switch)[0].abs();

@@ -91,7 +91,7 @@ pub fn frequencies(at: &Point) -> Vec<f64> {
     there.iter().map(|z| z.im).collect()
 }
 
-/// Relative difference of two frequencies below which their eigenvectors cannot be told apart.
+/// Relative difference of two frequencies below which their eigenvectors cannot be distinguished.
 pub(crate) const SAME: f64 = 1e-6;
 
 /// True if two pairs are on the imaginary axis with the same frequency.

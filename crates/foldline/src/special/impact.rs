@@ -94,7 +94,7 @@ pub fn sequence(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> S
     }
 }
 
-/// The reason why a solution is no motion of a field with events; `None` if it is one.
+/// Reason why a solution is not a motion of a field with events; `None` if it is one.
 pub fn inadmissible(field: &dyn VectorField, at: &Point) -> Option<String> {
     if field.event_count() == 0 {
         return None;

@@ -67,8 +67,8 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     }
 }
 
-/// Monitors along a branch on which quantities are held, in several parameters: a turning point of one of them is no
-/// bifurcation, so the spectrum alone decides. Folds and branch points are told apart afterwards.
+/// Monitors along a branch on which quantities are held, in several parameters: a turning point of one of them is not a
+/// bifurcation, so the spectrum alone decides. Folds and branch points are distinguished afterwards.
 pub fn monitors_of_held_quantities(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     let mut all = monitors(family, symmetric);
     all.retain(|monitor| !matches!(monitor.kind(), Kind::Fold | Kind::BranchPoint));

@@ -18,10 +18,10 @@
 //!
 //! **Source.** govaerts2000, §3 and §7; leine2004, §7; nordmark1991.
 //!
-//! **Departures.** Derivatives of g are central differences: second derivatives of switches, resets and of f in time are
-//! not available. They only guide Newton's method, and g itself is computed to rounding.
+//! **Departures.** Derivatives of g are central differences: second derivatives of switches, resets and of f in time
+//! are not available. They only guide Newton's method, and g itself is computed to rounding.
 //!
-//! **Fails when** a curve of torus points comes to a 1:1 or 1:2 resonance, where it ends with a message.
+//! **Fails when** a curve of torus points approaches a 1:1 or 1:2 resonance, where it ends with a message.
 
 use super::impact::{Highest, highest};
 use crate::contract::{Condition, ZeroProblem};
@@ -267,8 +267,8 @@ impl Condition for OnImpacts<'_> {
     fn obstacle(&self, extra: &[f64]) -> Option<&'static str> {
         let at_resonance = extra.iter().any(|angle| angle.sin().abs() < STRONG);
         at_resonance.then_some(
-            "the curve of torus points comes to a 1:1 or 1:2 resonance, next to which those of cycles with events are not \
-             computed",
+            "the curve of torus points approaches a 1:1 or 1:2 resonance, near which torus points of cycles with events are \
+             not computed",
         )
     }
 

@@ -228,7 +228,7 @@ impl Quantity {
         }
     }
 
-    /// All names that [`Quantity::named`] accepts, without harmonics and what is made of two quantities.
+    /// All names that [`Quantity::named`] accepts, except harmonics and combinations of two quantities.
     pub fn names(model: &Model) -> Vec<String> {
         let channels = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         let places: &[&str] = if model.conditions() == [0, 0] { &[] } else { &["@0", "@1"] };
@@ -244,8 +244,8 @@ impl Quantity {
     }
 }
 
-/// Appends quantities to the averages of a point, after those of its states and outputs, so that what reads the numbers of
-/// points alone shows them. Returns them as quantities of the extended point.
+/// Appends quantities to the averages of a point, after those of its states and outputs, so that code that reads only
+/// the numbers of points shows them. Returns them as quantities of the extended point.
 pub fn append(point: &mut Point, quantities: &[Quantity], model: &Model) {
     let channels = model.states.len() + model.outputs.len();
     let values: Vec<f64> = quantities.iter().map(|own| own.on(point, model).unwrap_or(f64::NAN)).collect();

@@ -215,7 +215,7 @@ fn curvature(
     rate.is_finite().then_some(rate)
 }
 
-/// Words for a sliding bifurcation.
+/// Description of a sliding bifurcation: its type and the surface.
 pub fn described(field: &dyn VectorField, at: &Point) -> String {
     let Solution::Cycle(cycle) = &at.solution else { return String::new() };
     let all = (0..field.switch_count())

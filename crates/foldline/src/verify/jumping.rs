@@ -14,7 +14,7 @@ use crate::linalg::{larger, max_abs};
 use crate::problem::impact::stored::{Impact, impacts};
 use crate::special::impact::{highest, speed};
 
-/// Places of a step at which extreme values are looked for, and rounds of parabolas about one.
+/// Number of positions in a step at which extreme values are sought, and rounds of parabolas about one.
 const SAMPLES: usize = 8;
 const ROUNDS: usize = 4;
 /// Speed of an event, relative to that of an oscillation of the same size, and distance of a maximum from a surface,

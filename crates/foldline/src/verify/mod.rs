@@ -98,15 +98,15 @@ pub struct Check {
     pub parameter: f64,
     /// Quantity that is compared.
     pub quantity: Quantity,
-    /// Error stated by the diagram plus that of the comparison itself; `None` if the diagram states none, as runs of
-    /// earlier versions for multipliers.
+    /// Error stated by the diagram plus that of the comparison itself; `None` if the diagram states none, such as those
+    /// of earlier versions for multipliers.
     pub stated: Option<f64>,
     /// Difference found.
     pub found: f64,
 }
 
 impl Check {
-    /// Difference over the stated error; above 1 the diagram is wrong. `None` if no error is stated.
+    /// Difference divided by the stated error; above 1 the diagram is wrong. `None` if no error is stated.
     pub fn ratio(&self) -> Option<f64> {
         let stated = self.stated?;
         Some(if self.found == 0.0 { 0.0 } else { self.found / stated })

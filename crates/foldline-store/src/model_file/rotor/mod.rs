@@ -1,8 +1,8 @@
 //! Rotors: sections of a model file that describe shafts, discs, bearings and rings.
 //!
 //! **Idea.** The sections become parts of a [`Rotor`], which [`foldline_shaft`] assembles and turns into states,
-//! equations and outputs of the model. Numbers are in SI units unless they carry a unit; a coefficient may name a
-//! parameter or be an expression, which becomes a definition so that mistakes in it have a position.
+//! equations and outputs of the model. Numbers are in SI units unless they carry a unit. A coefficient may be the name
+//! of a parameter or an expression; an expression becomes a definition, so that mistakes in it have a position.
 
 mod loads;
 mod matrices;

@@ -64,8 +64,8 @@ impl Reader<'_> {
         }
     }
 
-    /// Reads coefficients over the speed, as monotone cubics, constant beyond the first and the last speed; returns
-    /// stiffness and damping by name.
+    /// Reads coefficients as functions of the speed: monotone cubics, constant beyond the first and the last speed.
+    /// Returns stiffness and damping by name.
     fn over_speed(
         &mut self,
         value: &Value,

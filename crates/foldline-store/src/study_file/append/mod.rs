@@ -1,7 +1,7 @@
 //! Requests appended to the text of a study.
 //!
-//! **Idea.** Each action is a block of lines at the end of the text, or an entry in `switch` of a branch. Everything else,
-//! comments included, stays as it is. The result is read again, so it is a study that a run can go on with.
+//! **Idea.** Each action adds a block of lines at the end of the text, or an entry to `switch` of a branch. Everything
+//! else, comments included, stays as it is. The result is read again, which ensures that a run can go on with it.
 
 mod switch;
 
@@ -45,7 +45,7 @@ pub enum Action {
     },
     /// The motion that starts from a state of the solution.
     Simulate,
-    /// Simulation at one value of the parameter after the other.
+    /// Simulation at successive values of the parameter.
     Sweep {
         /// True towards larger values.
         up: bool,
@@ -54,7 +54,7 @@ pub enum Action {
     Survey,
 }
 
-/// A longer study.
+/// A study with a request appended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Appended {
     /// Its text.
@@ -70,7 +70,7 @@ pub struct Appended {
 pub enum Refusal {
     /// A sentence.
     Because(String),
-    /// The longer study would have mistakes.
+    /// The study with the request would contain mistakes.
     Mistakes(Vec<Diagnostic>),
 }
 
@@ -211,8 +211,8 @@ fn block(study: &Study, place: &Place, action: &Action) -> Result<(String, Strin
     }
 }
 
-/// Value of `from` that stands for a point: its parameter, and the largest value of one quantity, which tells points on
-/// either side of a fold apart.
+/// Value of `from` that identifies a point: its parameter, and the largest value of one quantity, which distinguishes
+/// points on either side of a fold.
 fn from(study: &Study, place: &Place) -> Result<String, String> {
     let (model, plan) = (&study.model, root(study, place.branch)?);
     // A rounded value may lie beyond a fold.

@@ -11,7 +11,7 @@ use toml::de::{DeTable, DeValue};
 pub(super) fn switched(study: &Study, place: &Place) -> Result<Appended, String> {
     let Some((kind, number)) = place.special else { return Err("branches are switched at special points only".into()) };
     if !matches!(kind, Kind::PeriodDoubling | Kind::BranchPoint | Kind::Hopf) {
-        return Err(format!("no branch leaves at a {} point", kind.name()));
+        return Err("branches are switched here only at period doublings, branch points and Hopf points".into());
     }
     let plan = root(study, place.branch)?;
     let steps: Vec<(Kind, usize)> = place.branch[plan.name.len()..]

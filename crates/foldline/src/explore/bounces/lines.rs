@@ -8,9 +8,9 @@
 //!
 //!   (1)  misfit = min_w max_k |e_k - σ H(ikw) g_k| / |e_k|
 //!
-//! The local forces are also taken at shares σ of their size ([`SHARES`]), from which they then grow to the whole: the softer a
-//! ring, the closer the motion is to two lines, and the more starts converge. For each share a pair of amplitudes and
-//! directions contributes the phase with the smallest misfit, if it is below [`GOOD`].
+//! The local forces are also taken at shares σ of their size ([`SHARES`]), from which they then grow to the whole: the
+//! softer the ring, the closer the motion is to two lines, and the more starts converge. For each share a pair of
+//! amplitudes and directions contributes the phase with the smallest misfit, if it is below [`GOOD`].
 //!
 //! **Fails when** the motion is carried by harmonics of the two lines rather than by themselves.
 

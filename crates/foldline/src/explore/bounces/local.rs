@@ -1,4 +1,4 @@
-//! Fields that are linear but for a few local forces.
+//! Fields that are linear except for a few local forces.
 //!
 //! **Equations.** About an equilibrium x₀,
 //!

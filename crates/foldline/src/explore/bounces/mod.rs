@@ -1,10 +1,11 @@
 //! First cycles with two frequencies in a given ratio, from the balance of harmonics at the coordinates of local forces.
 //!
-//! **Idea.** A rotor that bounces in a ring moves in two whirls whose frequencies the contact pulls into a ratio of whole
-//! numbers. The rest of the rotor, however large, is linear: it only answers with a flexibility at each frequency. So the
-//! few coordinates of the contact are the only unknowns. Two lines with amplitudes and a phase from a grid, and the frequency that
-//! suits them best, are corrected by Newton's method on a few harmonics, with soft contact that is then stiffened, then on
-//! more harmonics. The cycle of the whole model that belongs to them is the start for collocation. No transient is computed, and unstable cycles are found like stable ones.
+//! **Idea.** A rotor that bounces in a ring moves in two whirls whose frequencies the contact pulls into a ratio of
+//! whole numbers. The rest of the rotor, however large, is linear and enters only through its flexibility at each
+//! frequency, so that the few coordinates of the contact are the only unknowns. Two lines with amplitudes and a phase
+//! from a grid, and the frequency that suits them best, are corrected by Newton's method on a few harmonics, with soft
+//! contact that is then stiffened, then on more harmonics. The cycle of the whole model that belongs to them is the
+//! start for collocation. No transient is computed, and unstable cycles are found as well as stable ones.
 //!
 //! | step | file |
 //! |---|---|
@@ -131,7 +132,7 @@ impl Bounces {
         )
     }
 
-    /// Why there is none.
+    /// Reason why no cycle was found.
     pub(super) fn none(&self, (p, q): (u32, u32)) -> String {
         let Tally { starts, solved, fitting, coordinates } = self.tally;
         let what = match (starts, solved, fitting) {

@@ -5,10 +5,10 @@ use super::super::plan::Wanted;
 use super::search::{Candidate, Search, Seed};
 use crate::diagram::{Branch, Kind, Point, Shown, SpecialPoint};
 
-/// Distance of the diagrams from the candidate, as a share of its distance from the branch of the question: visible in a
-/// picture, and close enough to tell which motion it is.
+/// Distance of the diagrams from the candidate, as a fraction of its distance from the branch of the question: visible
+/// in a picture, and small enough to identify the motion.
 const BESIDE: f64 = 0.01;
-/// Errors of a candidate by which something lies beyond it.
+/// Distance beyond a candidate, in errors of the candidate, from which a special point counts as farther.
 const CLEARLY: f64 = 5.0;
 /// Positions in the extent of the inner diagram at which lines start.
 const INNER: [f64; 3] = [0.25, 0.5, 0.75];

@@ -8,12 +8,12 @@ use crate::diagram::{Binds, Branch, Ending, Kind, Origin, Point, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
 
-/// Part of the range by which curves are followed beyond its ends, so that their passages of the ends are located.
+/// Fraction of the range by which curves are followed beyond its ends, so that their passages of the ends are located.
 const BEYOND: f64 = 0.01;
 /// Difference of parameters, relative to size, within which a special point lies on a curve: far above the errors, far below
 /// the distance of curves.
 const ON_CURVE: f64 = 1e-4;
-/// Limit likewise for the ranges of states, which change faster next to a fold.
+/// The corresponding limit for the ranges of states, which change faster next to a fold.
 const ALIKE: f64 = 1e-2;
 
 impl Search<'_> {

@@ -355,7 +355,7 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// Adds the reasons for which the curves leave the answer open.
+    /// Adds the reasons why the curves leave the answer open.
     fn judge_curves(&mut self) {
         let p = self.name(self.design.vary);
         for (index, _) in self.curves.clone() {

@@ -1,9 +1,9 @@
-//! The system of [`super::condensed`] for fields that are linear but for a few local forces.
+//! The system of [`super::condensed`] for fields that are linear except for a few local forces.
 //!
 //! **Idea.** The Jacobian of a large structure is constant along an orbit except for forces that act on few coordinates
-//! and depend on few coordinates. In the modal coordinates of the constant part an interval without such forces falls
-//! apart into one small system for each mode, and the forces enter with low rank. Matrices of the size of an interval are
-//! never formed.
+//! and depend on few coordinates. In the modal coordinates of the constant part an interval without such forces
+//! separates into one small system for each mode, and the forces enter with low rank. Matrices of the size of an
+//! interval are never formed.
 //!
 //! **Equations.** f_x = J + P c(t) E, J = V Λ V⁻¹, x = V y; r forces and s local coordinates, P `[n × r]`, c `[r × s]`,
 //! E `[s × n]`; the equations of an interval are (1)–(4) of [`super::condensed`] with

@@ -1,9 +1,9 @@
 //! Cycles with events, at which the state jumps.
 //!
-//! **Idea.** The flights between the events of a cycle are the states of one boundary-value problem
-//! ([`segments`]), which [`CycleProblem`] solves like any other. Their durations are unknowns, so that every event stays
-//! at the end of its flight, the orbit is a smooth function of all unknowns, and a branch passes regularly through the
-//! point where the velocity of an impact vanishes. What lies beyond it is no motion; the branch ends there.
+//! **Idea.** The flights between the events of a cycle are the states of one boundary-value problem ([`segments`]),
+//! which [`CycleProblem`] solves like any other. Their durations are unknowns, so that every event stays at the end of
+//! its flight, the orbit is a smooth function of all unknowns, and a branch passes regularly through the point where
+//! the velocity of an impact vanishes. Solutions beyond that point are not motions, so the branch ends there.
 //!
 //! **Equations.** With Φ_i the transition of flight i, ∇h, h_τ the derivatives of the switch and R_x, R_τ those of the
 //! reset of the event that ends it, f⁻ and f⁺ before and after it:

@@ -76,7 +76,7 @@ type OnPart<'a> = dyn Fn(&[f64], [f64; 2], f64) -> f64 + 'a;
 pub(crate) enum Obstacle {
     /// It slides along several switching surfaces at once.
     Slides,
-    /// It passes switching surfaces more often than is computed on one interval.
+    /// It passes more switching surfaces than are computed on one interval.
     Chatters,
     /// Newton's method does not converge on a part.
     Lost,

@@ -13,6 +13,6 @@ const REACHED: f64 = 1e-3;
 pub fn reached(at: &Point) -> Option<Ending> {
     let sizes = || at.spectrum.iter().map(|z| z.re.abs());
     let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, larger));
-    let why = "an eigenvalue of the equilibrium comes close to the imaginary axis, where no saddle is left";
+    let why = "an eigenvalue of the equilibrium approaches the imaginary axis, where it ceases to be a saddle";
     (least < REACHED * largest).then(|| Ending::GivenUp(why.into()))
 }
