@@ -398,6 +398,17 @@ pub struct Table {
     /// Uncertainty of the special points from that of the parameters
     #[arg(long, group = "what")]
     pub uncertainty: bool,
+    /// Response of every solution to a small further forcing, to first order: the largest amplitude of each state per
+    /// unit of the forcing, and the distance of the frequency from the nearest exponent
+    #[arg(long, group = "what")]
+    pub susceptibility: bool,
+    /// With --susceptibility: amplitude of the forcing in the equation of a state, a number or an expression of parameters for
+    /// cos νt, with a factor i at its end for -sin νt; can be repeated
+    #[arg(long, value_name = "STATE=AMPLITUDE", allow_hyphen_values = true)]
+    pub force: Vec<String>,
+    /// With --susceptibility: ν, an expression of parameters in radians per unit of time
+    #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
+    pub frequency: Option<String>,
     /// With --sensitivities or --uncertainty: also this number (`period`, or a state or output followed by _min or _max), or
     /// `all`; can be repeated [default: the parameter of the branch, the period, and the angle of the multipliers]
     #[arg(long, value_name = "NAME")]
@@ -432,6 +443,7 @@ pub enum What {
     Notes,
     Sensitivities,
     Uncertainty,
+    Susceptibility,
 }
 
 impl Table {
@@ -444,6 +456,7 @@ impl Table {
             (self.notes, What::Notes),
             (self.sensitivities, What::Sensitivities),
             (self.uncertainty, What::Uncertainty),
+            (self.susceptibility, What::Susceptibility),
         ];
         asked.into_iter().find(|(asked, _)| *asked).map_or(What::Special, |(_, what)| what)
     }

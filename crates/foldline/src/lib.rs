@@ -38,5 +38,6 @@ pub mod sensitivity;
 pub mod simulation;
 pub mod special;
 pub mod stability;
+pub mod susceptibility;
 pub mod units;
 pub mod verify;

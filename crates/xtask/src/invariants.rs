@@ -35,6 +35,7 @@ const MODULES: &[(&str, &[&str])] = &[
     ("simulation", &["contract", "diagram", "linalg"]),
     ("special", &["contract", "diagram", "linalg", "model", "problem", "stability"]),
     ("stability", &["linalg"]),
+    ("susceptibility", &["contract", "diagram", "special"]),
     ("units", &[]),
     (
         "verify",

@@ -332,6 +332,22 @@ fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) ->
     model.parameters.iter().enumerate().map(|(index, p)| Column::in_unit(&p.name, style(index), &p.unit)).collect()
 }
 
+/// Columns of the parameters and of the period.
+pub fn place_names(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
+    let mut columns = parameter_columns(diagram, model, kept);
+    columns.push(Column::in_unit(duration(model), Style::Number, &model.time));
+    columns
+}
+
+/// Cells of these columns.
+pub fn places(point: &Point, model: &Model) -> Vec<Cell> {
+    let mut cells: Vec<Cell> = (0..model.parameters.len())
+        .map(|k| point.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v)))
+        .collect();
+    cells.push(point.solution.period().map_or(Cell::Empty, Cell::Number));
+    cells
+}
+
 fn output_columns(model: &Model) -> impl Iterator<Item = Column> {
     model.outputs.iter().map(|o| Column::in_unit(&format!("{}_max", o.name), Style::Number, &o.unit))
 }

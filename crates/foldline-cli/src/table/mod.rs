@@ -5,6 +5,7 @@ mod designs;
 mod format;
 mod responses;
 mod sensitivity;
+mod susceptibility;
 
 pub use sensitivity::found;
 
@@ -87,7 +88,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Points | What::Branches => Part::Numbers,
         What::Special | What::Responses | What::Designs | What::Notes => Part::Special,
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
+        What::Susceptibility => return susceptibility::print(typed),
     };
+    if !typed.force.is_empty() || typed.frequency.is_some() {
+        return Err(Failure::typed("--force and --frequency apply to --susceptibility", "add it, or leave them out"));
+    }
     if typed.position.is_some() {
         return Err(Failure::typed("--position applies to --sensitivities", "leave it out"));
     }
@@ -121,6 +126,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Designs => designs::designs(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
+        What::Susceptibility => return susceptibility::print(typed),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
     write(&table, typed.format, &mut out)?;

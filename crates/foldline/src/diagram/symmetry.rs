@@ -35,6 +35,11 @@ impl Symmetry {
         self.images.get(i).copied().unwrap_or((i, false))
     }
 
+    /// True if it does more than change signs.
+    pub fn permutes(&self) -> bool {
+        self.images.iter().enumerate().any(|(i, (from, _))| *from != i)
+    }
+
     /// Number of states n; 0 for the identity.
     pub fn dim(&self) -> usize {
         self.images.len()

@@ -9,7 +9,7 @@ use super::{System, known, tori};
 use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, station};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
-use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
+use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Symmetry, Trust};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::impact::{Flights, ImpactProblem};
 use crate::problem::map::MapProblem;
@@ -402,18 +402,22 @@ pub(super) fn across(
     let one = step_off_from(problem, settings, u, vector, 1.0, &distances, &leaves, improved)
         .map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
-    let symmetric =
-        step_off_from(problem, settings, u, vector, -1.0, &distances, &|_, _| true, improved).is_ok_and(|other| {
-            let images = system.symmetries.iter().filter(|r| !r.is_identity());
-            let gap = (one.parameter() - other.parameter()).abs();
-            gap < 1e-6 * (1.0 + one.parameter().abs())
-                && images
-                    .into_iter()
-                    .any(|r| one.point.difference(&other.point, system.measure(), r) < 30.0 * settings.tolerance)
-        });
-    if symmetric {
-        // The other half of the branch is the mirror image of this one.
-        return Ok(Beginning::Edge { before: Vec::new(), first: one, joined: joined(at, free) });
+    let alike = |other: &Station, r: &Symmetry| {
+        let gap = (one.parameter() - other.parameter()).abs();
+        let apart = one.point.difference(&other.point, system.measure(), r);
+        gap < 1e-6 * (1.0 + one.parameter().abs()) && apart < 30.0 * settings.tolerance
+    };
+    if let Ok(other) = step_off_from(problem, settings, u, vector, -1.0, &distances, &|_, _| true, improved)
+        && let Some(symmetry) = system.symmetries.iter().find(|r| !r.is_identity() && alike(&other, r))
+    {
+        // The other half of the branch is the mirror image of this one. Of states that are exchanged the first is the
+        // larger one, so that the choice does not depend on rounding.
+        let differs =
+            |(a, b): &(&[f64; 2], &[f64; 2])| (a[1] - b[1]).abs() > settings.tolerance * a[1].abs().max(b[1].abs());
+        let swapped = symmetry.permutes()
+            && one.point.ranges.iter().zip(&other.point.ranges).find(differs).is_some_and(|(a, b)| a[1] < b[1]);
+        let first = if swapped { other } else { one };
+        return Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) });
     }
     Ok(Beginning::Inside(one))
 }
