@@ -60,8 +60,11 @@ pub(super) fn read(
     let table = item.table;
     walk.only(table, &KEYS, "a curve");
     let base = base(walk, item, ground, all);
-    // Solutions of a forced model are cycles.
-    let forced = ground.model.forced().then_some(Family::Cycle);
+    // Solutions of a forced model are cycles, unless conditions take the place of periodicity.
+    let forced = match ground.model.conditions() {
+        [0, 0] => ground.model.forced().then_some(Family::Cycle),
+        _ => Some(Family::Arc),
+    };
     let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
     if let (true, Some(Kind::BranchPoint | Kind::Grazing), Some(value)) =
         (ground.model.iterated(), hold, item.table.get("hold"))
@@ -205,6 +208,10 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         return None;
     };
     let wrong = match (kind, family) {
+        (Kind::Fold | Kind::BranchPoint, Some(Family::Arc)) => None,
+        (_, Some(Family::Arc)) => {
+            Some(("solutions of boundary-value problems have only folds and branch points", "fold or branch-point"))
+        }
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }

@@ -76,7 +76,10 @@ pub fn follow_from(
     observer: &dyn Observer,
 ) -> (Branch, bool) {
     let sizes = special.as_ref().map_or(system.scales.clone(), |special| sizes(&special.point, &system.scales));
-    let unfolded = Unfolded::new(system.field, &sizes);
+    let unfolded = match &special {
+        Ok(special) => Unfolded::at(system.field, &sizes, &special.point),
+        Err(_) => Unfolded::new(system.field, &sizes),
+    };
     let system = &System { unfolded: Some(&unfolded), ..system.clone() };
     let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
         let growth = Growth {
