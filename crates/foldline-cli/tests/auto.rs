@@ -75,3 +75,92 @@ macro_rules! demos {
     };
 }
 
+// The ignored ones take four to twenty seconds each: `cargo test --release -p foldline-cli --test auto -- --ignored`.
+demos! {
+    ab,
+    abc,
+    abcb,
+    apbp,
+    brc,
+    brf,
+    bvp,
+    chu,
+    #[ignore = "takes seconds"]
+    cir,
+    cusp,
+    dd2,
+    enz,
+    exp,
+    ext,
+    ezp,
+    ffn,
+    fhh,
+    fhn,
+    fnb,
+    frc,
+    fsh,
+    hen,
+    #[ignore = "takes seconds"]
+    int,
+    ivp,
+    #[ignore = "takes seconds"]
+    kar,
+    kpr,
+    lcbp,
+    lin,
+    log,
+    lor,
+    lrz,
+    man,
+    mtn,
+    nag,
+    nep,
+    non,
+    obv,
+    pd1,
+    pd2,
+    #[ignore = "takes seconds"]
+    pen,
+    ph1,
+    phs,
+    pla,
+    plp,
+    pp2,
+    pp3,
+    ppp,
+    pvl,
+    #[ignore = "takes seconds"]
+    r3b,
+    rev,
+    #[ignore = "takes seconds"]
+    san,
+    #[ignore = "takes seconds"]
+    she,
+    spb,
+    sspg,
+    stw,
+    tfc,
+    tim,
+    tor,
+    um2,
+    um3,
+    vhb,
+    wav,
+}
+
+#[test]
+fn every_study_is_tested_and_every_value_belongs_to_one() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/auto");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let studies: Vec<String> = files.filter_map(|name| Some(name.strip_suffix(".toml")?.to_string())).collect();
+    let source = include_str!("auto.rs");
+    let page = include_str!("../../../docs/book/auto-demos.md");
+    for study in &studies {
+        assert!(source.contains(&format!("    {study},\n")), "{study} is not tested");
+        assert!(page.contains(&format!("[`{study}`]")), "{study} is not on the page");
+    }
+    for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {
+        let name = line.split(',').next().unwrap();
+        assert!(studies.iter().any(|study| study == name), "{line}");
+    }
+}
