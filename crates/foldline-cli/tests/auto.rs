@@ -56,7 +56,10 @@ fn agrees(demo: &str) {
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../studies/auto/{demo}.toml"));
     let folder = tempfile::tempdir().unwrap();
     let output = foldline(folder.path(), &["run", study.to_str().unwrap(), "--out", "run", "--quiet"]);
-    assert_eq!(output.status.code(), Some(0), "{demo}: {}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8_lossy(&output.stderr);
+    // A study may state how many points are enough.
+    let complete = said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
+    assert!(complete && matches!(output.status.code(), Some(0 | 3)), "{demo}: {said}");
     let found = special_points(folder.path());
     for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {
         let [name, kind, values] = line.split(',').collect::<Vec<&str>>()[..] else { panic!("{line}") };
