@@ -363,6 +363,7 @@ def hold(
     *,
     until: float | str | None = None,
     branch_range: Range | None = None,
+    also: Mapping[str, Range] | None = None,
     max_points: int = 10_000,
     name: str | None = None,
     out: Path | None = None,
@@ -385,6 +386,8 @@ def hold(
         Follow only towards this value and stop there. Without `range`, the range extends from the point to this value.
     branch_range : pair, optional
         Range of the parameter of the branch within which the curve stays; by default the range of the branch.
+    also : mapping, optional
+        A third parameter and its range, as in `{"c": (-1, 1)}`: a branch point is followed in three parameters.
     max_points : int
         Largest number of points on each side of the point.
     name : str, optional
@@ -421,7 +424,8 @@ def hold(
     ends = check_range(range, f'foldline.hold(point, "{free}", {{}})', missing)
     own = name or f"{point.kind} of {branch.name} over {free}"
     options: dict[str, Any] = {"out": out, "jobs": jobs, "resume": resume, "progress": progress}
-    curve = {"name": own, "hold": point.kind, "of": branch.name, "near": point.value, "free": free, "range": ends,
+    ranges = {key: check_range(pair, f'foldline.hold(point, "{free}", (0, 1), also={{"{key}": {{}}}})') for key, pair in (also or {}).items()}
+    curve = {"name": own, "hold": point.kind, "of": branch.name, "near": point.value, "free": free, "range": ends, "also": ranges or None,
              "branch-range": check_range(branch_range, f'foldline.hold(point, "{free}", (0, 1), branch_range={{}})'),
              "until": None if until is None else end("until", until), "max-points": whole("max_points", max_points)}  # fmt: skip
     study, start = going_on(branch, {}, curve=[cleaned(curve)])

@@ -42,7 +42,7 @@ def _depth() -> int:
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
     """Returns an item of a study without the keys not given, and with hyphens in kinds of special points, as in files."""
     kept = {key: value for key, value in item.items() if value is not None}
-    for key in ("range", "branch-range"):
+    for key in ("range", "branch-range", "also"):
         if isinstance(kept.get(key), Mapping):
             kept[key] = {name: [end("the range", own) for own in ends] for name, ends in kept[key].items()}
         elif key in kept:

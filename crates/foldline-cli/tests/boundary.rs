@@ -228,8 +228,8 @@ fn mistakes_are_answered_with_place_cause_and_cure() {
             "no motion starts from an initial state",
         ),
         (
-            format!("{study}[[curve]]\nname = \"c\"\nof = \"b\"\nhold = \"fold\"\nfree = \"p\"\nrange = [0, 1]\n"),
-            "curves in two parameters are not followed for boundary-value problems",
+            format!("{study}[[curve]]\nname = \"c\"\nof = \"b\"\nhold = \"torus\"\nfree = \"p\"\nrange = [0, 1]\n"),
+            "solutions of boundary-value problems have only folds and branch points",
         ),
     ] {
         let found = mistakes(&good, &study);
@@ -238,4 +238,107 @@ fn mistakes_are_answered_with_place_cause_and_cure() {
     let solved = model("length = 1\nsolve = [\"p\"]", "a = \"u@0\"\nb = \"u@1\"\nc = \"u'@0 - 1\"");
     let found = mistakes(&solved, &study);
     assert!(found.contains("`p` is determined by the conditions"), "{found}");
+}
+
+/// Curve of a kind of special point of the branch "b", with marks at values of its second parameter.
+fn curve(hold: &str, free: &str, range: &str, marks: &str) -> String {
+    format!(
+        "[[curve]]\nname = \"c\"\nof = \"b\"\nhold = \"{hold}\"\nfree = \"{free}\"\nrange = {range}\nmark = {{ {free} = \
+         {marks} }}\n"
+    )
+}
+
+/// Pairs of the first and the second parameter at the marks of the curve, and their stated errors.
+fn on_curve(study: &Study, diagram: &Diagram, names: [&str; 2]) -> Vec<[f64; 3]> {
+    let marks = of_kind(diagram.branch("c").unwrap(), Kind::Mark);
+    let values = |s: &SpecialPoint| names.map(|name| value(&study.model, name, &s.point));
+    marks.iter().map(|s| (values(s), s.error)).map(|([a, b], error)| [a, b, error]).collect()
+}
+
+/// By scaling x, the fold of Bratu's problem on an interval of length L is at p L² = 3.513830719125, and the mean, which a
+/// further condition determines, is the same for all L.
+#[test]
+fn a_fold_is_followed_in_the_rate_and_the_length_of_the_slab() {
+    let model = "[interval]\nlength = \"L\"\nvariable = \"x\"\nsolve = [\"mean\"]\n[parameters]\np = 0\nL = 1\nmean = 0\n\
+                 [states.\"u''\"]\nequation = \"-p*exp(u)\"\n[boundary]\nleft = \"u@0\"\nright = \"u@1\"\n[integrals]\n\
+                 own = \"u - mean\"\n";
+    let branch = seeded("state = \"zero\"", "p", "[0, 8]", "stop = { u_max = 3 }");
+    let (study, diagram) = given(model, &format!("{branch}{}", curve("fold", "L", "[0.6, 1.6]", "[0.7, 1.5]")));
+    complete(&diagram);
+    let found = on_curve(&study, &diagram, ["p", "L"]);
+    assert_eq!(found.len(), 2, "{found:?}");
+    let mean = value(&study.model, "mean", &diagram.branch("c").unwrap().points[0]);
+    for [p, length, error] in found {
+        near(p * length * length, 3.513830719125, 1e-9);
+        assert!(error < 1e-8, "{error:e}");
+    }
+    for point in &diagram.branch("c").unwrap().points {
+        near(value(&study.model, "mean", point), mean, 1e-8);
+    }
+}
+
+/// Ignition and extinction of a slab (collocation with six points, a separate program, to 1e-8), and the point at which they
+/// meet, where the first and second derivatives of p by the largest temperature m vanish (a separate program, to 1e-11) in
+///
+///   √p = √2 ∫₀^m du / √(F(m) - F(u)),   F' = exp(u / (1 + e u))
+#[test]
+fn ignition_and_extinction_meet_in_a_cusp() {
+    let branch = seeded("state = \"zero\"", "p", "[0, 12]", "stop = { u_max = 20 }");
+    let (study, diagram) = of("thermal-explosion", &format!("{branch}{}", curve("fold", "e", "[0.1, 0.3]", "[0.1, 0.23]")));
+    complete(&diagram);
+    let [cusp] = of_kind(diagram.branch("c").unwrap(), Kind::Cusp)[..] else { panic!() };
+    near(value(&study.model, "p", &cusp.point), 5.229494254693, 1e-9);
+    near(value(&study.model, "e", &cusp.point), 0.245780427232, 1e-9);
+    let found = on_curve(&study, &diagram, ["p", "e"]);
+    for known in [3.952831214835, 4.980849511181, 4.746725632792] {
+        assert!(found.iter().any(|[p, ..]| (p - known).abs() < 1e-8), "{known} is not among {found:?}");
+    }
+}
+
+/// A rod on an elastic foundation buckles at p = k + π², a beam whose deflection stretches it at p = π² + f/π².
+#[test]
+fn buckling_loads_are_followed_in_the_stiffness_of_a_foundation() {
+    let rod = "[interval]\nlength = 1\nvariable = \"s\"\n[parameters]\np = 5\nk = 0\n[states.\"th''\"]\nequation = \
+               \"-p*sin(th) + k*th\"\n[boundary]\nleft = \"th'@0\"\nright = \"th'@1\"\n";
+    let beam = "[interval]\nlength = 1\nsolve = [\"stretch\"]\n[parameters]\np = 5\nk = 0\nstretch = 0\n[states]\nw = \"w1\"\n\
+                w1 = \"w2\"\nw2 = \"w3\"\nw3 = \"(2*stretch - p)*w2 - k*w\"\n[boundary]\na = \"w@0\"\nb = \"w@1\"\nc = \
+                \"w2@0\"\nd = \"w2@1\"\n[integrals]\nm = \"w1^2/2 - stretch\"\n";
+    let branch = seeded("state = \"zero\"", "p", "[5, 20]", "");
+    let slopes = [1.0, 1.0 / (PI * PI)];
+    for (model, slope) in [rod, beam].into_iter().zip(slopes) {
+        let (study, diagram) =
+            given(model, &format!("{branch}{}", curve("branch-point", "k", "[-2, 5]", "[-1, 4]")));
+        complete(&diagram);
+        let found = on_curve(&study, &diagram, ["p", "k"]);
+        assert_eq!(found.len(), 2, "{found:?}");
+        for [p, k, error] in found {
+            near(p, PI * PI + slope * k, 1e-8);
+            assert!(error < 1e-8, "{error:e}");
+        }
+    }
+}
+
+/// u'' = c u' grows like e^{200} over the interval, far beyond what its map from one end to the other has digits for. The
+/// only solution has no special point, and its sign must not flip.
+#[test]
+fn strong_growth_along_the_interval_is_no_special_point() {
+    let model = "[interval]\nlength = 1\n[parameters]\nc = 1\n[states]\nu = \"v\"\nv = \"c*v - 0.1*sin(u)\"\n[boundary]\n\
+                 left = \"u@0 - 1\"\nright = \"u@1 - 2\"\n";
+    let (_, diagram) = given(model, &seeded("state = { u = \"1 + t\", v = 1 }", "c", "[1, 200]", ""));
+    complete(&diagram);
+    let branch = diagram.branch("b").unwrap();
+    assert!(branch.special.is_empty(), "{:?}", branch.special.iter().map(|s| s.kind).collect::<Vec<Kind>>());
+}
+
+/// Trajectories from one end of the interval say nothing about sizes: here they reach 1e77, and with such scales any profile
+/// would pass for a solution.
+#[test]
+fn scales_are_those_of_the_profiles() {
+    let model = "[interval]\nlength = 1\n[parameters]\np = 1\n[states]\nu = \"v\"\nv = \"100*u + p\"\n[boundary]\n\
+                 left = \"u@0\"\nright = \"u@1\"\n";
+    let (study, diagram) = given(model, &seeded("state = \"zero\"", "p", "[0.5, 1]", ""));
+    assert_eq!(System::of_plan(&study.model, &study.plan).scales, [1.0, 1.0]);
+    let point = diagram.branch("b").unwrap().points.iter().find(|point| point.parameters[0] == 1.0).unwrap();
+    // u = (cosh(10 (t - 1/2)) / cosh 5 - 1) / 100.
+    near(value(&study.model, "u@0.5", point), (1.0 / 5.0f64.cosh() - 1.0) / 100.0, 1e-9);
 }

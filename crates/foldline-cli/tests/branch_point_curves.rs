@@ -228,3 +228,25 @@ fn a_curve_of_symmetry_breaking_of_lorenz_cycles_passes_the_branch_points_of_bra
     let there = rho(cycles(10.2, "").branch("b").unwrap());
     assert!((end.parameters[first] - there).abs() < 1e-6 * there, "{} {there}", end.parameters[first]);
 }
+
+/// (x - mu)(x - q²) + c - q/10: branches over mu cross where x = mu = q² and c = q/10, for isolated values of q if c is given.
+#[test]
+fn a_crossing_for_an_isolated_value_is_followed_in_three_parameters() {
+    let model = "[parameters]\nmu = 0.5\nq = 1\nc = 0.1\n[equations]\nx = \"(x - mu)*(x - q^2) + c - q/10\"\n[states]\nx = {}\n";
+    let seed = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = { x = 0.5 }\n";
+    let third = "range = [0.5, 1.5]\nalso = { c = [-1, 1] }\nmark = { q = 1.25 }\n";
+    let diagram = grown(model, &format!("{seed}{PLAN}{third}"));
+    let curve = diagram.branch("curve").unwrap();
+    assert!(curve.ends.iter().all(|end| matches!(end, Some(Ending::Bound(_)))), "{:?}", curve.ends);
+    assert!(curve.points.len() > 5);
+    for point in &curve.points {
+        let [mu, q, c] = point.parameters[..] else { panic!() };
+        assert!((mu - q * q).abs() < 1e-9 && (c - q / 10.0).abs() < 1e-9, "{mu} {q} {c}");
+    }
+    let [mark] = &curve.special[..] else { panic!("{:?}", curve.special.iter().map(|s| s.kind).collect::<Vec<Kind>>()) };
+    assert!((mark.point.parameters[0] - 1.5625).abs() < mark.error.max(1e-9));
+    // In two parameters there is no curve, and the message says so.
+    let two = grown(model, &format!("{seed}{PLAN}range = [0.5, 1.5]\n"));
+    let end = two.branch("curve").unwrap().ends[0].clone();
+    assert!(matches!(&end, Some(Ending::NoStart(why)) if why.contains("only for this value")), "{end:?}");
+}

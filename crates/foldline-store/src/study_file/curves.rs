@@ -3,6 +3,7 @@
 use super::branches::{bounds, free, marks, range, switch_step};
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
 use super::seeds::state;
+use super::unknown_parameter;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
 use foldline::contract::VectorField;
@@ -10,13 +11,14 @@ use foldline::diagram::{Family, Kind, Shown};
 use foldline::explore::{BranchPlan, CurvePlan, Start};
 use foldline::model::Parameter;
 
-pub(super) const KEYS: [&str; 13] = [
+pub(super) const KEYS: [&str; 14] = [
     "name",
     "description",
     "hold",
     "of",
     "near",
     "to",
+    "also",
     "free",
     "range",
     "branch-range",
@@ -60,8 +62,11 @@ pub(super) fn read(
     let table = item.table;
     walk.only(table, &KEYS, "a curve");
     let base = base(walk, item, ground, all);
-    // Solutions of a forced model are cycles.
-    let forced = ground.model.forced().then_some(Family::Cycle);
+    // Solutions of a forced model are cycles, unless conditions take the place of periodicity.
+    let forced = match ground.model.conditions() {
+        [0, 0] => ground.model.forced().then_some(Family::Cycle),
+        _ => Some(Family::Arc),
+    };
     let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
     if let (true, Some(Kind::BranchPoint | Kind::Grazing), Some(value)) =
         (ground.model.iterated(), hold, item.table.get("hold"))
@@ -74,6 +79,7 @@ pub(super) fn read(
     let near = near(walk, item, branch_range, first);
     let to = to(walk, item, ground, hold, base.as_ref().and_then(|base| base.family));
     let second = second(walk, item, ground, base.as_ref());
+    let third = third(walk, item, ground, hold, [base.as_ref().map(|base| base.plan.free), second]);
     let max_points = max_points(walk, item);
     let marks = marks(walk, table, ground.model);
     let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
@@ -101,6 +107,7 @@ pub(super) fn read(
         of: base.name,
         near: near.flatten(),
         to: to?,
+        third: third?,
         free,
         ranges: [branch_range, range],
         until,
@@ -205,6 +212,10 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         return None;
     };
     let wrong = match (kind, family) {
+        (Kind::Fold | Kind::BranchPoint, Some(Family::Arc)) => None,
+        (_, Some(Family::Arc)) => {
+            Some(("solutions of boundary-value problems have only folds and branch points", "fold or branch-point"))
+        }
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }
@@ -291,6 +302,44 @@ fn to(
         return None;
     }
     state(walk, value, ground.model).map(Some)
+}
+
+/// Reads the third parameter of a curve of branch points, with its range; `Some(None)` if there is none.
+fn third(
+    walk: &mut Walk,
+    item: &Item,
+    ground: &Ground,
+    hold: Option<Kind>,
+    taken: [Option<usize>; 2],
+) -> Option<Option<(usize, [f64; 2])>> {
+    let Some(value) = item.table.get("also") else { return Some(None) };
+    let model = ground.model;
+    let wrong = match hold {
+        Some(Kind::BranchPoint) | None if model.conditions() != [0, 0] => {
+            Some("branch points of boundary-value problems are followed in two parameters only")
+        }
+        Some(Kind::BranchPoint) | None => None,
+        _ => Some("`also` is the third parameter of a curve of branch points"),
+    };
+    if let Some(message) = wrong {
+        walk.report(value.span(), message, "leave out `also`");
+        return None;
+    }
+    let entries: Vec<_> = value.get_ref().as_table().into_iter().flat_map(|table| table.iter()).collect();
+    let [(key, own)] = entries[..] else {
+        walk.report(value.span(), "`also` names one parameter with its range", "a line such as `also = { q = [0, 1] }`");
+        return None;
+    };
+    let name: &str = key.get_ref();
+    let Some(index) = model.parameter_index(name) else {
+        unknown_parameter(walk, key.span(), name, model);
+        return None;
+    };
+    if taken.contains(&Some(index)) {
+        walk.report(key.span(), format!("{name} is free already"), "a third parameter of the model");
+        return None;
+    }
+    Some(Some((index, range(walk, own, &model.parameters[index].unit)?)))
 }
 
 /// Reads the second parameter, which must differ from that of the branch.

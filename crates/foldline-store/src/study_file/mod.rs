@@ -303,8 +303,7 @@ fn one_forcing(walk: &mut Walk, root: &DeTable) {
     }
 }
 
-/// Reports requests that do not apply to a boundary-value problem: whatever needs motions from initial states, and
-/// curves in two parameters, which are not followed for such problems.
+/// Reports what does not exist for a boundary-value problem: whatever needs motions from initial states.
 fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
     if model.second_phase().is_some() {
         return one_forcing(walk, root);
@@ -313,19 +312,10 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
         return;
     }
     designs::refuse(walk, root, "boundary-value problems");
-    for key in ["explore", "survey", "sweep", "curve"] {
+    for key in ["explore", "survey", "sweep"] {
         let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
-        let (message, hint) = match key {
-            "curve" => (
-                "curves in two parameters are not followed for boundary-value problems",
-                "repeat the branch at several values of the second parameter",
-            ),
-            _ => (
-                "the model is a boundary-value problem: no motion starts from an initial state",
-                "give a first profile with `[[seed]]` and follow it with `[[branch]]`",
-            ),
-        };
-        walk.report(span, message, hint);
+        let message = "the model is a boundary-value problem: no motion starts from an initial state";
+        walk.report(span, message, "give a first profile with `[[seed]]` and follow it with `[[branch]]`");
     }
     for (_, table) in walk.tables(root, "branch") {
         for key in ["hold", "peaks"] {

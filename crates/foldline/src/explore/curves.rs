@@ -76,7 +76,10 @@ pub fn follow_from(
     observer: &dyn Observer,
 ) -> (Branch, bool) {
     let sizes = special.as_ref().map_or(system.scales.clone(), |special| sizes(&special.point, &system.scales));
-    let unfolded = Unfolded::new(system.field, &sizes);
+    let unfolded = match &special {
+        Ok(special) => Unfolded::at(system.field, &sizes, &special.point),
+        Err(_) => Unfolded::new(system.field, &sizes),
+    };
     let system = &System { unfolded: Some(&unfolded), ..system.clone() };
     let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
         let growth = Growth {
@@ -146,6 +149,13 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     let (ending, point) =
         if backward { (&branch.ends[0], branch.points.first()) } else { (&branch.ends[1], branch.points.last()) };
     let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
+    if curve.third.is_some() {
+        return Err(format!(
+            "no branch starts from a curve in three parameters\nlikely cause: {} is one\nwhat to do: start from the branch on which \
+             it lies",
+            curve.name
+        ));
+    }
     if matches!(curve.hold, Kind::Homoclinic | Kind::Heteroclinic) {
         return Err(format!(
             "no branch starts from connecting orbits\nlikely cause: {} is a curve of them, and an orbit exists for isolated \

@@ -204,6 +204,7 @@ impl Discovery<'_, '_> {
             of: parent.name.clone(),
             near: None,
             to: None,
+            third: None,
             free: second,
             ranges: [plan.range, range],
             until: None,

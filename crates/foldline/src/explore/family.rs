@@ -3,7 +3,7 @@
 use super::crossings::Sets;
 use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
-use super::plan::{BranchPlan, Holds, Near, Plan, Start, Switching};
+use super::plan::{BranchPlan, CurvePlan, Holds, Near, Plan, Start, Switching};
 use super::seeds::Seeds;
 use super::{System, arrival, connections, crossings, curves, discovery, holds, homotopy, known, near, switch};
 use crate::continuation::{Settings, Station};
@@ -243,7 +243,10 @@ impl Work<'_> {
                 Kind::Homoclinic | Kind::Heteroclinic => connections::follow,
                 _ => curves::follow,
             };
-            let (branch, going) = follow(self.system, self.plan, curve, &parent, earlier, self.observer);
+            let (branch, going) = match curve.third {
+                Some(third) => self.in_three_parameters(curve, third, &parent),
+                None => follow(self.system, self.plan, curve, &parent, earlier, self.observer),
+            };
             let ended = curves::end_of(self.system, self.plan, curve, &branch);
             self.branches.push(branch);
             if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
@@ -251,6 +254,30 @@ impl Work<'_> {
             }
         }
         true
+    }
+
+    /// Follows branch points in three parameters.
+    fn in_three_parameters(&self, curve: &CurvePlan, third: (usize, [f64; 2]), parent: &Branch) -> (Branch, bool) {
+        let start = curves::start(curve, parent).map(|special| special.point.clone());
+        let parameter = start.as_ref().map_or(f64::NAN, |point| point.parameters[parent.free]);
+        let origin = Origin::Switch { parent: parent.name.clone(), kind: curve.hold, parameter };
+        let plan = BranchPlan {
+            name: curve.name.clone(),
+            start: Start::Seed(0),
+            free: curve.free,
+            range: curve.ranges[1],
+            until: curve.until,
+            switching: Switching::default(),
+            marks: curve.marks.clone(),
+            max_points: curve.max_points,
+            holds: Holds {
+                others: vec![(third.0, Some(third.1)), (parent.free, Some(curve.ranges[0]))],
+                singular: true,
+                ..Holds::default()
+            },
+        };
+        self.held(&plan, origin.clone(), start)
+            .unwrap_or_else(|| (Branch::new(&curve.name, parent.family, curve.free, origin), true))
     }
 
     fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (Settings, [bool; 2]) {

@@ -19,6 +19,7 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
+use crate::special::on_arcs::OnArcs;
 use crate::special::on_branch_points::OnBranchPoints;
 use crate::special::on_connections::{self, limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
@@ -130,15 +131,18 @@ fn setting_of<'a>(system: &'a System, axes: Vec<Axis>, point: &Point) -> Setting
 /// cannot be posed for such solutions.
 pub fn held<'a>(system: &'a System, kind: Kind, axes: Vec<Axis>, degree: usize, point: &Point) -> Option<Held<'a>> {
     let setting = setting_of(system, axes.clone(), point);
-    let free = axes.len();
+    let free = axes.len() - system.field.determined().len();
     if let (Kind::BranchPoint, Solution::Cycle(cycle), Some(unfolded), false) =
         (kind, &point.solution, system.unfolded, system.field.iterated())
     {
         let cycle = mesh::at_least_some(cycle, degree);
         let own = UnfoldedCycles::setting(&setting, unfolded, &system.scales, &cycle);
-        let condition = OnCycleBranchPoints::new(own.clone(), &cycle);
-        let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len(), free);
-        return Some(Held::new(Box::new(surface), Box::new(condition), free + 1));
+        let condition: Box<dyn Condition + 'a> = match system.is_open() {
+            true => Box::new(OnArcs::new(kind, own.clone(), &cycle)?),
+            false => Box::new(OnCycleBranchPoints::new(own.clone(), &cycle)),
+        };
+        let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len(), axes.len());
+        return Some(Held::new(Box::new(surface), condition, free + 1));
     }
     let condition = special::condition::condition(kind, setting, degree, &point.solution)?;
     let unfolded = kind == Kind::BranchPoint && !system.field.iterated();

@@ -165,6 +165,8 @@ pub struct CurvePlan {
     pub near: Option<f64>,
     /// A state near the second equilibrium of a connecting orbit that starts from a branch of equilibria.
     pub to: Option<Vec<f64>>,
+    /// A third parameter and its range, for branch points that exist for isolated values of the second one.
+    pub third: Option<(usize, [f64; 2])>,
     /// Index of the second parameter; the first is that of the branch.
     pub free: usize,
     /// Smallest and largest value of the branch's parameter, then of the second parameter.

@@ -10,6 +10,9 @@
 //!
 //!   (1)  maxᵢ |eᵢ| / Xᵢ ≤ [`ACCURACY`]
 //!
+//! A boundary-value problem has no motions, and trajectories from one end may grow without bound where its solutions do
+//! not. There the profiles of the seeds show the sizes.
+//!
 //! **Source.** bogacki1989 (the pair of orders 3 and 2).
 //!
 //! **Fails when** a state is 0 along every trajectory, or grows to the end of each; its size is then taken as 1.
@@ -44,6 +47,8 @@ const ASIDE: f64 = 1e-30;
 const BESIDE: f64 = 1e-3;
 /// Magnitude below which a state counts as 0: ten decades above [`ASIDE`], for growth that decays again.
 const NOTHING: f64 = 1e-20;
+/// Magnitude below which a state counts as 0 in the profile of a boundary-value problem, an expression whose value may be rounding, such as cos(π/2).
+const ROUNDED: f64 = 1e-12;
 /// Relative change of the state over a step at which a trajectory is at rest.
 const REST: f64 = 1e-6;
 
@@ -57,7 +62,15 @@ pub fn scales_from(model: &Model, state: &[f64], parameters: &[f64]) -> Vec<f64>
 /// Characteristic size of every state `[n]` in a plan: the size stated in the model, else the largest magnitude met
 /// from the starts of the plan, else 1.
 pub fn state_scales(model: &Model, plan: &Plan) -> Vec<f64> {
-    of_states(model, &places(model, plan))
+    if model.conditions() == [0, 0] {
+        return of_states(model, &places(model, plan));
+    }
+    let profiles = plan.seeds.iter().flat_map(|seed| match &seed.source {
+        SeedSource::State(state) => state.chunks_exact(model.dim().max(1)),
+        SeedSource::Cycle(cycle) => cycle.profile.chunks_exact(model.dim().max(1)),
+        SeedSource::Attractor(_) | SeedSource::Torus(_) | SeedSource::QuasiPeriodic => [].chunks_exact(1),
+    });
+    of_states(model, &profiles.map(|state| (state.to_vec(), Vec::new())).collect::<Vec<Place>>())
 }
 
 /// Returns the origin at these parameters.
@@ -112,11 +125,12 @@ pub(super) fn of_states(model: &Model, places: &[Place]) -> Vec<f64> {
         let mut reaches = |state: &[f64]| met.iter_mut().zip(state).for_each(|(size, x)| *size = size.max(x.abs()));
         for (state, parameters) in places {
             reaches(state);
-            for aside in [false, true] {
+            for aside in [false, true].into_iter().filter(|_| model.conditions() == [0, 0]) {
                 reaches(&largest(model, state, parameters, aside).unwrap_or_default());
             }
         }
-        let known = |size: &f64| *size > NOTHING && size.is_finite();
+        let least = if model.conditions() == [0, 0] { NOTHING } else { ROUNDED };
+        let known = |size: &f64| *size > least && size.is_finite();
         sizes.iter_mut().zip(met).for_each(|(size, met)| *size = size.or(Some(met).filter(known).map(rounded)));
     }
     sizes.into_iter().map(|size| size.unwrap_or(1.0)).collect()

@@ -387,14 +387,17 @@ pub(super) fn across(
     let mesh = problem.mesh();
     // A curved parent may meet the hyperplane too. The chord then makes half the angle with the parent's tangent that
     // the tangent at its end makes; on another branch through the point the two angles are equal.
-    let (own, own_mesh) = (&at.point.tangent, mesh.clone());
+    let own_mesh = mesh.clone();
     let leaves = |problem: &dyn ZeroProblem, found: &Station| {
-        let tangent = problem.transfer(&found.tangent, &found.mesh, &own_mesh);
-        let mut chord = problem.carry(&found.u, &found.mesh, &own_mesh);
-        chord.iter_mut().zip(u).for_each(|(a, b)| *a -= b);
+        // Inner products belong to the current mesh.
+        let now = problem.mesh();
+        let own = problem.transfer(&at.point.tangent, &own_mesh, &now);
+        let tangent = problem.transfer(&found.tangent, &found.mesh, &now);
+        let mut chord = problem.carry(&found.u, &found.mesh, &now);
+        chord.iter_mut().zip(problem.carry(u, &own_mesh, &now)).for_each(|(a, b)| *a -= b);
         let angle = |a: &[f64]| {
-            let lengths = (problem.dot(a, a) * problem.dot(own, own)).sqrt();
-            (problem.dot(a, own).abs() / lengths).min(1.0).acos()
+            let lengths = (problem.dot(a, a) * problem.dot(&own, &own)).sqrt();
+            (problem.dot(a, &own).abs() / lengths).min(1.0).acos()
         };
         angle(&tangent) < 1.5 * angle(&chord)
     };

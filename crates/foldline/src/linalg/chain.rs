@@ -127,6 +127,15 @@ impl<T: Lane> Chain<T> {
         Ok(())
     }
 
+    /// Sign of det E of the remaining relation in every lane, if the E_j have positive determinants. Each step contributes
+    /// those of Q and R, since det E det E_j = det Q det R det E' there, and every reflection has the determinant -1. The
+    /// sign of E itself is lost in rounding where solutions grow by more than 1e16.
+    pub fn orientation(&self) -> T {
+        let (n, full) = (self.n, 3 * self.n + self.q);
+        let pivots = (1..self.length).flat_map(|j| (0..n).map(move |i| self.upper[(j * n + i) * full + i]));
+        pivots.fold(T::splat(1.0), |sign, pivot| sign * pivot.map(|x| -x.signum()))
+    }
+
     /// Eliminates x_j from (2) with the rows just made triangular.
     #[inline(always)]
     fn carry_border(&mut self, j: usize, n: usize, q: usize) {

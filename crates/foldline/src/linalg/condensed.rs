@@ -667,7 +667,8 @@ impl<T: Lane> Condensed<T> {
         if let Some(ends) = open {
             let sum = |k: usize| corner[k] + total(pieces.corner[k]) + whole.corner[k];
             let corner: Vec<f64> = (0..q * q).map(sum).collect();
-            return ends.factorise(whole, &corner, own_units, [n, q]);
+            let [own, of_pieces] = [whole.orientation(), if together { 1.0 } else { product(pieces.orientation()) }];
+            return ends.factorise(whole, &corner, own_units, own * of_pieces, [n, q]);
         }
         let Condensed { last, last_pivots, pieces, whole, .. } = self;
         for i in 0..n {
@@ -700,6 +701,11 @@ impl<T: Lane> Condensed<T> {
         let [least, most] = pivots.fold([f64::INFINITY, 0.0], |[least, most], x| [x.min(least), x.max(most)]);
         most <= REGULAR * least
     }
+}
+
+/// Product over the lanes.
+fn product<T: Lane>(x: T) -> f64 {
+    x.lanes().iter().product()
 }
 
 /// Compactifies every piece and writes the result where the elimination of a chain would; false if errors grow.

@@ -51,7 +51,8 @@ impl Ends {
         self.orientation
     }
 
-    /// Factorises (1)–(4) for an eliminated chain; `corner` `[q × q]` is D, and the states are in `units` `[n]`.
+    /// Factorises (1)–(4) for an eliminated chain; `corner` `[q × q]` is D, the states are in `units` `[n]`, and `sign` is
+    /// that of det E.
     ///
     /// # Errors
     /// [`Singular`] if the matrix is.
@@ -60,6 +61,7 @@ impl Ends {
         chain: &Chain<f64>,
         corner: &[f64],
         units: &[f64],
+        sign: f64,
         [n, q]: [usize; 2],
     ) -> Result<(), Singular> {
         let (size, full, conditions) = (2 * n + q, 3 * n + q, self.conditions(n, q));
@@ -87,11 +89,7 @@ impl Ends {
             row[2 * n + self.live + k] = 1.0;
         }
         lu::factorise(&mut self.matrix, size, &mut self.pivots)?;
-        let own = lu::determinant(&self.matrix, size, &self.pivots).0;
-        let mut right: Vec<f64> = chain.relation.chunks_exact(full).flat_map(|line| &line[n..2 * n]).copied().collect();
-        let mut pivots = vec![0; n];
-        lu::factorise(&mut right, n, &mut pivots)?;
-        self.orientation = own * lu::determinant(&right, n, &pivots).0;
+        self.orientation = lu::determinant(&self.matrix, size, &self.pivots).0 * sign;
         Ok(())
     }
 

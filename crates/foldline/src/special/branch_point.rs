@@ -124,12 +124,17 @@ pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> O
 /// Returns `dimension` orthonormal null vectors of F_u orthogonal to the tangent, by subspace inverse iteration.
 /// Preconditions as for [`direction`].
 pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {
-    let size = problem.unknowns();
     // At the point itself the matrix may be exactly singular; slightly off it the null vectors are nearly the same.
-    if problem.factorise(u, tangent).is_err() {
-        let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
+    [0.0, 1e-8].into_iter().find_map(|distance| {
+        let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + distance * t).collect();
         problem.factorise(&beside, tangent).ok()?;
-    }
+        null_vectors(&mut *problem, tangent, dimension)
+    })
+}
+
+/// The vectors of [`kernel`], from the last factorisation.
+fn null_vectors(problem: &mut dyn ZeroProblem, tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {
+    let size = problem.unknowns();
     let start = |j: usize| (0..size).map(|k| ((k * k) as f64 * (0.37 + 0.11 * j as f64) + 0.2).sin()).collect();
     let mut vectors: Vec<Vec<f64>> = (0..dimension).map(start).collect();
     let mut next = vec![0.0; size];

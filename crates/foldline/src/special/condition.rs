@@ -1,5 +1,6 @@
 //! Defining system for each kind of bifurcation point.
 
+use super::on_arcs::OnArcs;
 use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
 use super::on_equilibria::OnEquilibria;
@@ -23,6 +24,9 @@ pub fn condition<'a>(
         return Some(Box::new(OnMaps::new(kind, setting, at)?));
     }
     match at {
+        Solution::Cycle(arc) if setting.field.conditions() != [0, 0] => {
+            Some(Box::new(OnArcs::new(kind, setting, &mesh::at_least_some(arc, degree))?))
+        }
         Solution::Cycle(cycle) if has_events(kind, &setting, cycle) => {
             Some(Box::new(OnImpacts::new(kind, setting, cycle)?))
         }

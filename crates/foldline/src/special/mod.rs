@@ -33,6 +33,7 @@ pub mod map_form;
 mod map_operator;
 pub mod mark;
 pub mod normal_form;
+pub mod on_arcs;
 pub mod on_branch_points;
 pub mod on_connections;
 pub mod on_cycle_branch_points;

@@ -1,4 +1,5 @@
-//! Unfolding of a vector field by an additional amplitude, for curves of branch points of cycles.
+//! Unfolding of a vector field by an additional amplitude, for curves of branch points of cycles and of boundary-value
+//! problems.
 //!
 //! **Idea.** Where branches cross, the cycles of f with two free parameters do not form a smooth surface. Those of
 //! f(x, λ) + b d(x) with an unfolding amplitude b do, provided that d along the cycle is not in the range of the
@@ -8,7 +9,10 @@
 //!
 //!   (1)  d_i(x) = s_i Σ_j m_ij sin(x_j / s_j + φ_ij)
 //!
-//! b is the last parameter.
+//! b is the last parameter. In a boundary-value problem the conditions are shifted instead of f, with fixed numbers c and
+//! the sizes σ of the terms of each condition:
+//!
+//!   (2)  B_j + b σ_j c_j = 0,   ∫ (g_k + b σ_k c_k) dt = 0
 //!
 //! **Source.** allgower1990, §8 (unfolding of branch points); doedel2003 (cycles).
 
@@ -24,17 +28,51 @@ use std::f64::consts::FRAC_PI_2;
 pub struct Unfolded<'f> {
     field: &'f dyn VectorField,
     sizes: Vec<f64>,
+    /// σ c of (2), of the conditions at the ends and of those on integrals; empty unless there are conditions.
+    shifts: Vec<f64>,
 }
 
 impl<'f> Unfolded<'f> {
     /// Unfolds `field`; `sizes` `[n]` are the sizes of the states along the cycles.
     pub fn new(field: &'f dyn VectorField, sizes: &[f64]) -> Unfolded<'f> {
-        Unfolded { field, sizes: sizes.to_vec() }
+        let [ends, integrals] = field.conditions();
+        Unfolded { field, sizes: sizes.to_vec(), shifts: (0..ends + integrals).map(Unfolded::shift).collect() }
+    }
+
+    /// Unfolds `field` like [`Unfolded::new`], with conditions shifted in proportion to their terms at a solution.
+    pub fn at(field: &'f dyn VectorField, sizes: &[f64], point: &Point) -> Unfolded<'f> {
+        let mut own = Unfolded::new(field, sizes);
+        let ([ends, integrals], n) = (field.conditions(), field.dim());
+        let Solution::Cycle(arc) = &point.solution else { return own };
+        if own.shifts.is_empty() {
+            return own;
+        }
+        let (first, last) = (arc.state(0.0), arc.end());
+        let [mut b, mut left, mut right] = [1, n, n].map(|size| vec![0.0; ends * size]);
+        field.boundary([&first, &last], &point.parameters, &[], [&mut b, &mut left, &mut right, &mut []]);
+        let (mut g, mut gx) = (vec![0.0; integrals], vec![0.0; integrals * n]);
+        let parameters = Parameters::Shared(&point.parameters);
+        let batch = Batch { lanes: 1, states: &first, parameters, times: &[0.0], signs: &[] };
+        field.integrands(batch, &[], [&mut g, &mut gx, &mut []]);
+        let size = |rows: &[&[f64]], k: usize| -> f64 {
+            let terms = rows.iter().flat_map(|row| row[k * n..(k + 1) * n].iter().zip(sizes));
+            let sum: f64 = terms.map(|(x, s)| (x * s).abs()).sum();
+            if sum > 0.0 && sum.is_finite() { sum } else { 1.0 }
+        };
+        for (k, shift) in own.shifts.iter_mut().enumerate() {
+            *shift *= if k < ends { size(&[&left, &right], k) } else { size(&[&gx], k - ends) };
+        }
+        own
+    }
+
+    /// c_k: numbers without structure.
+    fn shift(k: usize) -> f64 {
+        0.3 + 0.7 * ((k * k) as f64 + 0.5).sin()
     }
 
     /// Unfolding of another field with the same states.
     pub fn over<'g>(&self, field: &'g dyn VectorField) -> Unfolded<'g> {
-        Unfolded { field, sizes: self.sizes.clone() }
+        Unfolded { field, sizes: self.sizes.clone(), shifts: self.shifts.clone() }
     }
 
     /// Splits a batch into that of f and the value of b in each lane.
@@ -60,6 +98,9 @@ impl<'f> Unfolded<'f> {
     /// Derivative of d_i in a lane along the directions (d_i itself without directions). Only the states, the first
     /// `[n × lanes]` of each direction, count.
     fn bent(&self, i: usize, lane: usize, at: &Batch, directions: &[&[f64]]) -> f64 {
+        if !self.shifts.is_empty() {
+            return 0.0;
+        }
         let turn = FRAC_PI_2 * directions.len() as f64;
         let term = |j: usize| {
             let (m, phase) = Unfolded::coefficients(i, j);
@@ -67,6 +108,25 @@ impl<'f> Unfolded<'f> {
             m * (at.states[j * at.lanes + lane] / self.sizes[j] + phase + turn).sin() * along
         };
         self.sizes[i] * (0..self.sizes.len()).map(term).sum::<f64>()
+    }
+
+    /// Writes the derivatives by the parameters `free`, `[rows × free × lanes]`, from those by the parameters of f and
+    /// those by b.
+    fn columns(&self, free: &[usize], of_own: &[f64], by_amplitude: &[f64], lanes: usize, out: &mut [f64]) {
+        let k = self.field.parameter_count();
+        let known = free.iter().filter(|index| **index < k).count();
+        for (row, shift) in by_amplitude.iter().enumerate() {
+            let mut next = 0;
+            for (c, index) in free.iter().enumerate() {
+                let to = &mut out[(row * free.len() + c) * lanes..][..lanes];
+                if *index < k {
+                    to.copy_from_slice(&of_own[(row * known + next) * lanes..][..lanes]);
+                    next += 1;
+                } else {
+                    to.fill(*shift);
+                }
+            }
+        }
     }
 
     fn add(&self, at: &Batch, amplitude: impl Fn(usize) -> f64, f: &mut [f64]) {
@@ -100,7 +160,7 @@ impl VectorField for Unfolded<'_> {
         let mut given = vec![0.0; n * known.len() * lanes];
         self.field.linearise(own, &known, f, fx, &mut given);
         self.add(&at, &amplitude, f);
-        for j in 0..n {
+        for j in 0..if self.shifts.is_empty() { n } else { 0 } {
             for (i, lane) in (0..n).flat_map(|i| (0..lanes).map(move |lane| (i, lane))) {
                 let term = |j: usize| {
                     let (m, phase) = Unfolded::coefficients(i, j);
@@ -161,6 +221,35 @@ impl VectorField for Unfolded<'_> {
 
     fn periods(&self) -> &[f64] {
         self.field.periods()
+    }
+
+    fn conditions(&self) -> [usize; 2] {
+        self.field.conditions()
+    }
+
+    fn determined(&self) -> &[usize] {
+        self.field.determined()
+    }
+
+    fn boundary(&self, ends: [&[f64]; 2], parameters: &[f64], free: &[usize], [b, left, right, bp]: [&mut [f64]; 4]) {
+        let (k, [count, _]) = (self.field.parameter_count(), self.field.conditions());
+        let own: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let mut of_own = vec![0.0; count * own.len()];
+        self.field.boundary(ends, &parameters[..k], &own, [&mut *b, left, right, &mut of_own]);
+        b.iter_mut().zip(&self.shifts).for_each(|(b, shift)| *b += parameters[k] * shift);
+        self.columns(free, &of_own, &self.shifts[..count], 1, bp);
+    }
+
+    fn integrands(&self, at: Batch, free: &[usize], [g, gx, gp]: [&mut [f64]; 3]) {
+        let (k, [ends, count]) = (self.field.parameter_count(), self.field.conditions());
+        let (inner, amplitude) = self.parts(at);
+        let own: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let mut of_own = vec![0.0; count * own.len() * at.lanes];
+        self.field.integrands(inner, &own, [&mut *g, gx, &mut of_own]);
+        for (line, shift) in g.chunks_exact_mut(at.lanes).zip(&self.shifts[ends..]) {
+            line.iter_mut().enumerate().for_each(|(lane, g)| *g += amplitude(lane) * shift);
+        }
+        self.columns(free, &of_own, &self.shifts[ends..], at.lanes, gp);
     }
 
     fn output_count(&self) -> usize {

@@ -133,6 +133,7 @@ impl Search<'_> {
                     of: seed.of.clone(),
                     near: None,
                     to: None,
+                    third: None,
                     free: self.design.vary,
                     ranges: [self.wider(), self.design.within],
                     until: None,

@@ -413,7 +413,8 @@ impl<'a> CycleProblem<'a> {
         self.length * self.width * self.scheme.degree
     }
 
-    fn profile_size(&self) -> usize {
+    /// Number of values that describe the profile.
+    pub fn profile_size(&self) -> usize {
         self.intervals() * (self.scheme.degree + 1) * self.n
     }
 

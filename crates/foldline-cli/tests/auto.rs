@@ -1,0 +1,169 @@
+//! The studies in `studies/auto`, which solve the problems of AUTO-07p's demos: special points against those that AUTO finds.
+//!
+//! `reference/auto.csv` contains values of AUTO-07p 0.9.2 with tolerances of 1e-9 or less for the solutions, 1e-7 or less for
+//! the location of special points, and two to three times the mesh intervals of its demos.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const REFERENCE: &str = include_str!("reference/auto.csv");
+
+/// Largest relative difference. AUTO ends the location of a special point when the next step in arclength is below its
+/// tolerance of 1e-7; a quantity may change up to ten times faster than the arclength, in its units. Nothing was found to differ
+/// by more than a third of this.
+const WITHIN: f64 = 1e-6;
+
+fn foldline(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+/// The cells of a line; quoted ones may contain commas.
+fn cells(line: &str) -> Vec<String> {
+    let (mut all, mut quoted) = (vec![String::new()], false);
+    for c in line.chars() {
+        match c {
+            '"' => quoted = !quoted,
+            ',' if !quoted => all.push(String::new()),
+            c => all.last_mut().unwrap().push(c),
+        }
+    }
+    all
+}
+
+/// Special points of a run, by column.
+fn special_points(folder: &Path) -> Vec<BTreeMap<String, String>> {
+    let table = String::from_utf8(foldline(folder, &["table", "run", "--format", "csv"]).stdout).unwrap();
+    let mut lines = table.lines().map(cells);
+    let names = lines.next().unwrap_or_default();
+    lines.map(|line| names.iter().cloned().zip(line).collect()).collect()
+}
+
+/// Largest relative difference of the values `name=value;…` in a special point; values near 0 count as 1e-3.
+fn difference(point: &BTreeMap<String, String>, values: &str) -> f64 {
+    let each = values.split(';').map(|pair| {
+        let (name, known) = pair.rsplit_once('=').unwrap();
+        let known: f64 = known.parse().unwrap();
+        let own: f64 = point.get(name).and_then(|own| own.parse().ok()).unwrap_or(f64::INFINITY);
+        (own - known).abs() / known.abs().max(1e-3)
+    });
+    each.fold(0.0, f64::max)
+}
+
+/// Runs the study of a demo and looks for its special points.
+#[track_caller]
+fn agrees(demo: &str) {
+    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../studies/auto/{demo}.toml"));
+    let folder = tempfile::tempdir().unwrap();
+    let output = foldline(folder.path(), &["run", study.to_str().unwrap(), "--out", "run", "--quiet"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    // A study may state how many points are enough.
+    let complete = said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
+    assert!(complete && matches!(output.status.code(), Some(0 | 3)), "{demo}: {said}");
+    let found = special_points(folder.path());
+    for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {
+        let [name, kind, values] = line.split(',').collect::<Vec<&str>>()[..] else { panic!("{line}") };
+        if name != demo {
+            continue;
+        }
+        let own = found.iter().filter(|point| point["kind"] == kind);
+        let best = own.map(|point| difference(point, values)).fold(f64::INFINITY, f64::min);
+        assert!(best < WITHIN, "{demo}: no {kind} at {values}; the nearest one differs by {best:e}");
+    }
+}
+
+macro_rules! demos {
+    ($($(#[$attribute:meta])* $name:ident,)*) => {
+        $($(#[$attribute])* #[test] fn $name() { agrees(stringify!($name)); })*
+    };
+}
+
+// The ignored ones take four to twenty seconds each: `cargo test --release -p foldline-cli --test auto -- --ignored`.
+demos! {
+    ab,
+    abc,
+    abcb,
+    apbp,
+    brc,
+    brf,
+    bvp,
+    chu,
+    #[ignore = "takes seconds"]
+    cir,
+    cusp,
+    dd2,
+    enz,
+    exp,
+    ext,
+    ezp,
+    ffn,
+    fhh,
+    fhn,
+    fnb,
+    frc,
+    fsh,
+    hen,
+    #[ignore = "takes seconds"]
+    int,
+    ivp,
+    #[ignore = "takes seconds"]
+    kar,
+    kpr,
+    lcbp,
+    lin,
+    log,
+    lor,
+    lrz,
+    man,
+    mtn,
+    nag,
+    nep,
+    non,
+    obv,
+    pd1,
+    pd2,
+    #[ignore = "takes seconds"]
+    pen,
+    ph1,
+    phs,
+    pla,
+    plp,
+    pp2,
+    pp3,
+    ppp,
+    pvl,
+    #[ignore = "takes seconds"]
+    r3b,
+    rev,
+    #[ignore = "takes seconds"]
+    san,
+    #[ignore = "takes seconds"]
+    she,
+    spb,
+    sspg,
+    stw,
+    tfc,
+    tim,
+    tor,
+    um2,
+    um3,
+    vhb,
+    wav,
+}
+
+#[test]
+fn every_study_is_tested_and_every_value_belongs_to_one() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/auto");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let studies: Vec<String> = files.filter_map(|name| Some(name.strip_suffix(".toml")?.to_string())).collect();
+    let source = include_str!("auto.rs");
+    let page = include_str!("../../../docs/book/auto-demos.md");
+    for study in &studies {
+        assert!(source.contains(&format!("    {study},\n")), "{study} is not tested");
+        assert!(page.contains(&format!("[`{study}`]")), "{study} is not on the page");
+    }
+    for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {
+        let name = line.split(',').next().unwrap();
+        assert!(studies.iter().any(|study| study == name), "{line}");
+    }
+}
