@@ -392,6 +392,9 @@ pub struct Table {
     /// Answers to design questions
     #[arg(long, group = "what")]
     pub designs: bool,
+    /// Cells of this map over parameters
+    #[arg(long, group = "what", value_name = "NAME")]
+    pub map: Option<String>,
     /// Derivatives of the special points with respect to every parameter
     #[arg(long, group = "what")]
     pub sensitivities: bool,
@@ -429,6 +432,7 @@ pub enum What {
     Branches,
     Responses,
     Designs,
+    Map,
     Notes,
     Sensitivities,
     Uncertainty,
@@ -441,6 +445,7 @@ impl Table {
             (self.branches, What::Branches),
             (self.responses, What::Responses),
             (self.designs, What::Designs),
+            (self.map.is_some(), What::Map),
             (self.notes, What::Notes),
             (self.sensitivities, What::Sensitivities),
             (self.uncertainty, What::Uncertainty),
@@ -510,6 +515,15 @@ pub struct Plot {
     /// Draw only this branch, or the legs of this homotopy; can be repeated
     #[arg(long, value_name = "NAME")]
     pub branch: Vec<String>,
+    /// Draw this map over one or two parameters instead
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "branch", "curves", "window", "unit", "uncertainty", "tornado"])]
+    pub map: Option<String>,
+    /// With --map: quantity to draw [default: what is found in each cell; over one parameter, the first number]
+    #[arg(long, value_name = "NAME", requires = "map")]
+    pub of: Option<String>,
+    /// With --map: motion or special point to draw, such as "2:1 cycle" or "response: fold 1"
+    #[arg(long, value_name = "LABEL", requires = "map")]
+    pub item: Option<String>,
     /// Draw the two-parameter curves in their plane instead of the branches
     #[arg(long, conflicts_with_all = ["uncertainty", "tornado"])]
     pub curves: bool,

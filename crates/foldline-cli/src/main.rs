@@ -11,6 +11,7 @@ mod failure;
 mod import_auto;
 mod new;
 mod plot;
+mod plot_map;
 mod progress;
 mod reproduce;
 mod rotor;

@@ -1,6 +1,7 @@
 //! Results: branches as columns, solutions one by one.
 
 use crate::bytes::{counted, integers, numbers, parts};
+use crate::cells::{Answered, answered};
 use crate::failure;
 use crate::saving::save;
 use crate::sensitivity::{Distributions, Row};
@@ -9,6 +10,7 @@ use crate::study::Study;
 use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
+use foldline::explore::cells::answers;
 use foldline::special::quantity::Quantity;
 use foldline_store::order::{leg, ordered};
 use foldline_store::run_file::load;
@@ -48,6 +50,15 @@ impl Diagram {
 
 #[pymethods]
 impl Diagram {
+    /// Special points as the answer of a cell of a map over parameters; without branches the reason, `short` among it.
+    fn answer<'py>(&self, py: Python<'py>, short: Vec<String>) -> PyResult<(Option<Answered<'py>>, String)> {
+        let notes: Vec<String> = self.notes.iter().map(|(_, note)| note.clone()).collect();
+        match answers::points(&self.diagram, &self.study.model, &short, &notes) {
+            Ok(found) => Ok((Some(answered(py, found)?), String::new())),
+            Err(reason) => Ok((None, reason)),
+        }
+    }
+
     /// Loads the run in a folder.
     #[staticmethod]
     fn load(py: Python, folder: PathBuf) -> PyResult<Diagram> {

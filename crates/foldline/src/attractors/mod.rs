@@ -56,7 +56,7 @@ pub(crate) use census::PERSISTENT;
 use census::Pace;
 use census::STEP_LIMIT;
 use runner::PATIENT;
-pub use sampling::Sampling;
+pub use sampling::{Sampling, stratified};
 pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
 pub(crate) use spectrum::ratio_of_samples;

@@ -25,6 +25,7 @@
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | which value of a parameter keeps a motion away? | `design` |
 //! | what does simulation find? | [`responses`] |
+//! | how does all this depend on other parameters? | [`cells`] |
 
 mod accounts;
 mod arcs;
@@ -33,6 +34,7 @@ mod averaged;
 mod axis;
 pub mod basins;
 mod bounces;
+pub mod cells;
 mod choice;
 mod connections;
 mod corner;
@@ -85,8 +87,8 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource,
-    Start, SurveyPlan, SweepPlan, Switching, Wanted,
+    AttractorKey, BranchPlan, CurvePlan, DesignPlan, Drawn, ExplorePlan, HomotopyPlan, MapPlan, Near, Over, Plan,
+    Question, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan, Switching, Wanted,
 };
 pub use seeds::{attractors, first_solution, unsettled_motions};
 pub use sizes::{scales_from, state_scales};
@@ -149,5 +151,5 @@ pub fn run_from(
     let responses = responses::simulate(system, plan, &seeds, jobs, &branches, &earlier, observer);
     let (legs, designs) = design::answers(system, plan, jobs, &branches, &earlier, observer);
     branches.extend(legs);
-    Diagram { branches, responses, designs, shortfalls: observer.shortfalls() }
+    Diagram { branches, responses, designs, cells: earlier.cells.clone(), shortfalls: observer.shortfalls() }
 }
