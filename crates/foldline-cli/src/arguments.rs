@@ -656,6 +656,25 @@ pub struct Basins {
     /// Number of cells along the horizontal axis of the plane, or along both axes as in 512x256
     #[arg(long, value_name = "N", default_value = "256", value_parser = cells, requires = "plane")]
     pub cells: [usize; 2],
+    /// Compute the cells of the plane only where the fate changes, beginning with blocks of N cells; others are filled, and some
+    /// of them checked [default without N: 8]
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "8", requires = "plane",
+          value_parser = clap::value_parser!(u16).range(2..=1024))]
+    pub adaptive: Option<u16>,
+    /// Also find the smallest kick that leads out of each basin: in the plane, or in all states, within their ranges; N directions
+    /// [default without N: 64]
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "64",
+          value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub kicks: Option<u32>,
+    /// Fractions over this parameter instead, with the attractors followed from value to value
+    #[arg(long, value_name = "NAME=FIRST:LAST", allow_hyphen_values = true, conflicts_with_all = ["plane", "kicks"])]
+    pub along: Option<String>,
+    /// With --along: number of values
+    #[arg(long, value_name = "N", default_value_t = 11, requires = "along", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub values: u32,
+    /// With --along: run whose branches give the attractors their names
+    #[arg(long, value_name = "DIR", requires = "along")]
+    pub branches: Option<PathBuf>,
     /// Number of threads [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
@@ -664,8 +683,8 @@ pub struct Basins {
     /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Picture of the plane; the file extension sets the format
-    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf", requires = "plane")]
+    /// Picture of the plane, or of the fractions over a parameter; the file extension sets the format
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: Option<PathBuf>,
     /// File for the cells of the plane, one per line: both states, and the number of the attractor or the reason why there
     /// is none

@@ -3,6 +3,7 @@
 mod arguments;
 mod attractors;
 mod basins;
+mod basins_along;
 mod check;
 mod emit;
 mod explore;

@@ -45,7 +45,8 @@ pub fn answered(py: Python<'_>, found: CellAnswer) -> PyResult<Answered<'_>> {
     Ok((dictionary(py, &found.values)?, items, found.remark, dictionary(py, &found.absent)?))
 }
 
-fn dictionary<'py>(py: Python<'py>, values: &CellValues) -> PyResult<Bound<'py, PyDict>> {
+/// Returns values as a dictionary.
+pub fn dictionary<'py>(py: Python<'py>, values: &CellValues) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
     for (name, value) in values {
         match value {

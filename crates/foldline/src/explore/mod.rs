@@ -26,8 +26,11 @@
 //! | which value of a parameter keeps a motion away? | `design` |
 //! | what does simulation find? | [`responses`] |
 //! | how does all this depend on other parameters? | [`cells`] |
+//! | which attractor does an initial state lead to? | [`basins`], in planes [`section`], over a parameter [`along`], by `rounds` |
+//! | which kick leads out of a basin? | [`kicks`] |
 
 mod accounts;
+pub mod along;
 mod arcs;
 mod arrival;
 mod averaged;
@@ -53,6 +56,7 @@ mod holds;
 pub mod homotopy;
 mod impacts;
 mod interrupt;
+pub mod kicks;
 pub mod known;
 mod lookout;
 mod maps;
@@ -66,7 +70,9 @@ pub mod recognised;
 mod repointed;
 mod resonances;
 mod responses;
+mod rounds;
 mod schedule;
+pub mod section;
 pub mod seeds;
 mod shooting;
 mod sizes;
