@@ -254,10 +254,11 @@ fn cells_in_a_run_file_survive_a_writer_that_never_ends() {
     }
     drop(recorder);
     let (recorder, earlier) = Recorder::resume(&copy, &study).expect("the run can be resumed");
-    assert_eq!(earlier.cells, cells[..2]);
+    // Texts, because a period that does not exist is NaN.
+    assert_eq!(format!("{:?}", earlier.cells), format!("{:?}", &cells[..2]));
     let second = stopping(usize::MAX);
     let all = mapped(&study, 1, &earlier.cells, &second);
-    assert_eq!((second.seen.load(Ordering::Relaxed), &all[..]), (2, &cells[..]));
+    assert_eq!((second.seen.load(Ordering::Relaxed), format!("{all:?}")), (2, format!("{cells:?}")));
     drop(recorder);
 }
 

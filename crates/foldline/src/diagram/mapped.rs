@@ -21,7 +21,7 @@ pub struct CellAnswer {
     pub values: CellValues,
     /// Label of each motion or special point found in the cell, with its values.
     pub items: Vec<(String, CellValues)>,
-    /// What fell short; empty if nothing did.
+    /// Remark on shortfalls; empty if there are none.
     pub remark: String,
     /// Values of a motion that was not found in the cell.
     pub absent: CellValues,

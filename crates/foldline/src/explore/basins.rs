@@ -92,7 +92,7 @@ impl Filled {
 }
 
 impl Basins {
-    /// Returns the basins with the attractors in the order of a census: equilibria, then cycles, each by decreasing hits.
+    /// Returns the basins with the attractors in the order of [`super::attractors`]: equilibria, then cycles, each by decreasing hits.
     pub(super) fn sorted(self) -> Basins {
         let mut order: Vec<usize> = (0..self.attractors.len()).collect();
         let cycle = |k: &usize| self.attractors[*k].point.solution.period().is_some();

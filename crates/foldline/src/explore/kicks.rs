@@ -8,17 +8,17 @@
 //!
 //! ```text
 //!   (1)  |Δ|² = Σ (Δ_i / w_i)²
-//!   (2)  error = (upper - lower end of the bracket) + ½ d δ²,  d = |Δ|
+//!   (2)  error = (upper - lower end of the bracket) + Σ (c + ε)² / (4 c),   c = ½ (d₊ + d₋) - d
 //! ```
 //!
-//! where δ is the last angle by which turning the ray did not shorten it: a plane boundary at the distance d is met at
-//! d / cos δ.
+//! At the end, turning the shortest ray by an angle in either sense of each direction at right angles gives the lengths d₊, d₋ ≥ d - ε,
+//! with the width ε of a bracket. A parabola through the three has its lowest point at most (c + ε)² / (4 c) below d.
 //!
 //! **Departures.** The states of a cycle are those at the beginnings of its forcing periods, or eight equally spaced in time
 //! without forcing.
 //!
 //! **Fails when** a part of another basin reaches between the rays, or between two states on one: the distance found is then too
-//! large. It is never too small by more than the integration error, because the state at it was seen to go elsewhere.
+//! large. It is never too small by more than the integration error, because the trajectory from the state at it went elsewhere.
 
 use super::System;
 use super::rounds::Rounds;
@@ -32,8 +32,11 @@ const PHASES: usize = 8;
 const ALONG: usize = 16;
 /// Relative width of the bracket at which bisection ends.
 const WIDTH: f64 = 1e-3;
-/// Relative radii at which a turned ray is searched for a change before its end.
-const NEARER: [f64; 6] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.995];
+/// Relative lengths at which a turned ray is searched for a change.
+const NEARBY: [f64; 9] = [0.5, 0.8, 0.9, 0.95, 0.98, 0.995, 1.01, 1.05, 1.2];
+/// Largest number of turns: seven halve a quarter of a circle to the last angle, and each may follow a few successful ones.
+/// Without an end the error is infinite.
+const TURNS: usize = 32;
 
 /// Directions of kicks.
 #[derive(Clone, Debug)]
@@ -139,15 +142,29 @@ impl Search<'_, '_> {
         }
     }
 
-    /// Turns a ray to where it is shortest. Returns it with the last angle by which turning did not shorten it.
-    fn turned(&mut self, mut ray: Ray, spacing: f64) -> (Ray, f64) {
-        if ray.direction.len() < 2 {
-            return (ray, 0.0);
+    /// Narrows the brackets of all rays on which a change is known.
+    fn narrow(&mut self, rays: &mut [Ray]) {
+        loop {
+            let wide =
+                |ray: &Ray| ray.bracket[1].is_finite() && ray.bracket[1] - ray.bracket[0] > WIDTH * ray.bracket[1];
+            let open: Vec<usize> = (0..rays.len()).filter(|k| wide(&rays[*k])).collect();
+            if open.is_empty() || self.rounds.ended() {
+                return;
+            }
+            let mut some: Vec<Ray> = open.iter().map(|k| rays[*k].clone()).collect();
+            self.scan(&mut some, &|ray| vec![0.5 * (ray.bracket[0] + ray.bracket[1])]);
+            open.into_iter().zip(some).for_each(|(k, ray)| rays[k] = ray);
         }
-        // A plane boundary met at this angle is at the relative distance WIDTH behind the nearest point.
-        let least = (2.0 * WIDTH).sqrt();
-        let (mut angle, mut in_vain) = (0.5 * spacing, 0.5 * spacing);
-        while angle > least && !self.rounds.ended() {
+    }
+
+    /// Turns a ray to where it is shortest. Returns it with the second term of (2).
+    fn turned(&mut self, mut ray: Ray, spacing: f64) -> (Ray, f64) {
+        let mut left = 0.0;
+        let mut angle = 0.5 * spacing;
+        for _ in 0..TURNS {
+            if ray.direction.len() < 2 || self.rounds.ended() {
+                break;
+            }
             let mut rays = Vec::new();
             for tangent in tangents(&ray.direction) {
                 for (sin, cos) in [angle, -angle].map(f64::sin_cos) {
@@ -155,16 +172,26 @@ impl Search<'_, '_> {
                     rays.push(self.ray(&ray.from, turned));
                 }
             }
-            let length = ray.bracket[1];
+            let [low, length] = ray.bracket;
             self.scan(&mut rays, &|own| {
-                NEARER.iter().map(|share| share * length).filter(|length| *length <= own.reach).collect()
+                NEARBY.iter().map(|share| share * length).filter(|length| *length <= own.reach).collect()
             });
-            match self.shortest(rays) {
-                Some(shorter) if shorter.bracket[1] < length => ray = shorter,
-                _ => (in_vain, angle) = (angle, 0.5 * angle),
+            self.narrow(&mut rays);
+            let shorter = rays.iter().min_by(|a, b| a.bracket[1].total_cmp(&b.bracket[1]));
+            if let Some(shorter) = shorter.filter(|own| own.bracket[1] < length) {
+                (ray, left) = (shorter.clone(), f64::INFINITY);
+                continue;
             }
+            let open = WIDTH * length;
+            let rise = |pair: &[Ray]| (0.5 * (pair[0].bracket[1] + pair[1].bracket[1]) - low).max(open);
+            left = rays.chunks_exact(2).map(rise).map(|rise| (rise + open).powi(2) / (4.0 * rise)).sum();
+            // A plane boundary met at this angle is at the relative distance WIDTH behind the nearest point.
+            if angle <= (2.0 * WIDTH).sqrt() && f64::is_finite(left) {
+                break;
+            }
+            angle *= 0.5;
         }
-        (ray, in_vain)
+        (ray, left)
     }
 }
 
@@ -271,11 +298,11 @@ pub fn kicks(
         let Some(first) = search.shortest(rays) else {
             return Err("no kick that stays within the ranges leads elsewhere".to_string());
         };
-        let (ray, angle) = search.turned(first, spacing);
+        let (ray, left) = search.turned(first, spacing);
         let [low, size] = ray.bracket;
         let end = search.state(&ray, size);
         let change = end.iter().zip(&ray.from).map(|(a, b)| a - b).collect();
-        let error = size - low + 0.5 * size * angle * angle;
+        let error = size - low + left;
         Ok(Kick { size, error, from: ray.from, change, fate: ray.fate })
     };
     attractors.iter().enumerate().map(one).collect()

@@ -303,13 +303,13 @@ pub struct Drawn {
 /// Question that a map asks in each cell.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Question {
-    /// Where are the special points of the study's branches?
+    /// The special points of the study's branches.
     Points,
-    /// Which attractors exist?
+    /// The attractors.
     Motions(Drawn),
-    /// How large are their basins?
+    /// The fractions of their basins.
     Shares(Drawn),
-    /// What are these quantities of the motion that settles from this start?
+    /// These quantities of the motion that settles from this start.
     Settled(Vec<(String, Reading)>, SeedPlan),
 }
 
