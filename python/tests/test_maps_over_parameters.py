@@ -123,7 +123,14 @@ def rows_of(found, item):
 def test_a_map_in_a_study_has_the_same_numbers(cusp):
     grid = {"b": [0.75, 3.0]}
     own = dict(name="own", over=grid, samples=32)
-    tables = {**STUDY, "map": [dict(name="points", what="points", over=grid), {**own, "name": "motions", "what": "motions"}, {**own, "name": "shares", "what": "shares"}]}
+    tables = {
+        **STUDY,
+        "map": [
+            dict(name="points", what="points", over=grid),
+            {**own, "name": "motions", "what": "motions"},
+            {**own, "name": "shares", "what": "shares"},
+        ],
+    }
     maps = foldline.run(tables, cusp).maps
     assert list(maps) == ["points", "motions", "shares"]
     for name, what, item in (("points", STUDY, "point"), ("motions", "motions", "motion"), ("shares", "shares", "motion")):
