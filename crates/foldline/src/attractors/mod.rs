@@ -226,7 +226,7 @@ pub fn survey_map(field: &dyn VectorField, parameters: &[f64], sampling: &Sampli
 }
 
 /// Samples like [`survey_map`], one set of initial states after the other: what the first ones show about the attractors is kept
-/// in `memory` for the next. Only for autonomous fields without angles; for others each set begins anew.
+/// in `memory` for the next. Only for autonomous fields without angles; for others nothing is kept.
 pub fn survey_map_again(
     field: &dyn VectorField,
     parameters: &[f64],

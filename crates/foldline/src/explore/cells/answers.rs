@@ -84,7 +84,8 @@ pub fn motions(
     jobs: usize,
 ) -> CellAnswer {
     let census = attractors(system, parameters, drawn.samples, drawn.random, jobs, tolerance);
-    let (mut kinds, mut items): (Vec<(String, usize)>, Vec<(String, CellValues)>) = Default::default();
+    let mut kinds: Vec<(String, usize)> = Vec::new();
+    let mut items: Vec<(String, CellValues)> = Vec::new();
     for own in &census.attractors {
         let kind = kind_of(&own.point.solution, own.ratio);
         add(&mut kinds, &kind);
@@ -231,7 +232,8 @@ pub fn points(diagram: &Diagram, model: &Model, short: &[String], notes: &[Strin
         let told = joined(&mut short.iter().chain(notes));
         return Err(if told.is_empty() { "the study has no branches".to_string() } else { told });
     }
-    let (mut kinds, mut items): (Vec<(String, usize)>, Vec<(String, CellValues)>) = Default::default();
+    let mut kinds: Vec<(String, usize)> = Vec::new();
+    let mut items: Vec<(String, CellValues)> = Vec::new();
     for branch in &diagram.branches {
         let free = model.parameters.get(branch.free).map_or("", |own| own.name.as_str());
         let mut numbers: Vec<(String, usize)> = Vec::new();

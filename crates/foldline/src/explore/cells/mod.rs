@@ -27,6 +27,9 @@ use std::sync::{Mutex, PoisonError};
 /// contact rotor, whose basin fractions take 2.2·10⁷ evaluations a second.
 pub const MOST: usize = 20_000_000_000;
 
+/// Function that returns a diagram in the order in which it is shown, and messages on shortfalls.
+pub type Finished<'a> = dyn Fn(Diagram, &Plan) -> (Diagram, Vec<String>) + Sync + 'a;
+
 /// Model, plan, and how a diagram is completed.
 pub struct Asked<'a> {
     /// The model.
@@ -34,7 +37,7 @@ pub struct Asked<'a> {
     /// Plan of the study, whose branches the question about special points follows.
     pub plan: &'a Plan,
     /// Returns a diagram in the order in which it is shown, and what fell short in it.
-    pub finished: &'a (dyn Fn(Diagram, &Plan) -> (Diagram, Vec<String>) + Sync),
+    pub finished: &'a Finished<'a>,
 }
 
 /// Computes the missing cells of all maps of a plan with `jobs` threads. Returns all cells, those in `known` first.
