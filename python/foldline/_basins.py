@@ -44,6 +44,9 @@ class Basins:
     early : tuple, or None
         For each attractor the distance, relative to its size, at which a steady approach counted as settled, if there is one; number of
         trajectories that were followed further; number of those that then went elsewhere.
+    filled : tuple, or None
+        Of an adaptive section: for each cell 1 if it was computed and 0 if it was filled, shape (rows, columns); number of filled
+        cells that were checked; number of those that were wrong.
 
     Examples
     --------
@@ -65,6 +68,7 @@ class Basins:
         y: Floats,
         cells: Integers,
         early: tuple[list[float | None], int, int] | None,
+        filled: tuple[Integers, int, int] | None = None,
     ) -> None:
         self.model = model
         self.attractors = attractors
@@ -75,6 +79,7 @@ class Basins:
         self.y = y
         self.cells = cells
         self.early = early
+        self.filled = filled
 
     def share(self, fate: int) -> tuple[float, float, float]:
         """Returns the fraction of the ranges from which states go to an attractor.
@@ -196,6 +201,7 @@ def basins(
     plane: tuple[str, str] | None = None,
     at: Mapping[str, float] | None = None,
     cells: int | tuple[int, int] = 256,
+    adaptive: int | None = None,
     tolerance: float = 1e-6,
     jobs: int | None = None,
     max_steps: int | None = None,
@@ -220,6 +226,8 @@ def basins(
         Values of the other states in the plane; by default 0, or the nearest value of the range.
     cells : int or pair
         Number of cells along both axes.
+    adaptive : int, optional
+        Computes the cells of the plane only where the fate changes, beginning with blocks of so many cells. The others are filled.
     tolerance : float
         Relative tolerance of the attractors, from 1e-10 to 1e-4.
     jobs : int, optional
@@ -271,7 +279,9 @@ def basins(
                 raise InputError(f"{name} is an axis of the plane\n  help: at={{...}} is for the other states")
             through[index] = number(name, value)
         section = (axes, (columns, rows), raw(through))
-    found, drawn, fates, states, early, spans = _native.basins(
+    if adaptive is not None and plane is None:
+        raise ArgumentError("adaptive has no effect without a plane\n  help: plane=('x', 'y'), adaptive=8")
+    found, drawn, fates, states, early, spans, filled = _native.basins(
         model._native,
         model._values(parameters),
         raw(box),
@@ -281,13 +291,15 @@ def basins(
         tolerable(tolerance),
         processors(jobs),
         limits(max_steps, max_time),
+        None if adaptive is None else whole("adaptive", adaptive),
     )
     attractors = [Solution(own, model) for own, _ in found]
     used = floats(spans, len(names), 2)
     x, y = (low + (np.arange(n) + 0.5) / max(n, 1) * (high - low) for n, (low, high) in ((columns, used[axes[0]]), (rows, used[axes[1]])))
     grid = integers(fates).reshape(len(y), len(x)) if plane is not None else np.empty((0, 0), dtype=np.int64)
     samples_of = floats(states, count, len(names))
-    return Basins(model, attractors, samples_of, integers(drawn), (plane[0], plane[1]) if plane else None, x, y, grid, early)
+    known = None if filled is None else (integers(filled[0]).reshape(len(y), len(x)), *filled[1:])
+    return Basins(model, attractors, samples_of, integers(drawn), (plane[0], plane[1]) if plane else None, x, y, grid, early, known)
 
 
 def _index(model: Model, name: str) -> int:

@@ -98,6 +98,20 @@ class Diagram:
         """Answers to the design questions of the study by name."""
         return {own["name"]: Design(**{**own, "range": tuple(own["range"])}) for own in self._native.designs()}
 
+    @cached_property
+    def maps(self) -> dict[str, list[dict[str, Any]]]:
+        """Maps over parameters of the study by name: a row for each motion or special point of each cell, as `foldline table --map` prints it.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a*x - x^3"}, states={"x": dict(range=(-2, 2))}, parameters={"a": 1.0})
+        >>> study = dict(map=[dict(name="wells", what="motions", samples=16, over=dict(a=[-1.0, 1.0]))])
+        >>> [(row["a"], row["motions"]) for row in foldline.run(study, model).maps["wells"]]
+        [(-1.0, 'equilibrium'), (1.0, '2 equilibria')]
+        """
+        return dict(self._native.maps())
+
     @property
     def sweeps(self) -> list[Sweep]:
         """The sweeps of the study."""

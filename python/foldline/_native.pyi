@@ -68,6 +68,10 @@ class Diagram:
     def study(self) -> Study: ...
     def in_units(self, units: list[tuple[str, str]]) -> Diagram: ...
     def short(self) -> list[str]: ...
+    def maps(self) -> list[tuple[str, list[dict[str, Any]]]]: ...
+    def answer(
+        self, short: list[str]
+    ) -> tuple[tuple[dict[str, Any], list[tuple[str, dict[str, Any]]], str, dict[str, Any]] | None, str]: ...
     def branches(self) -> list[dict[str, Any]]: ...
     def column(self, branch: int, special: bool, name: str) -> bytes: ...
     def quantity(self, branch: int, special: bool, name: str) -> bytes | None: ...
@@ -122,7 +126,25 @@ def basins(
     tolerance: float,
     jobs: int,
     limits: tuple[int | None, float | None],
-) -> tuple[list[tuple[Solution, tuple[int, int] | None]], bytes, bytes, bytes, tuple[list[float | None], int, int] | None, bytes]: ...
+    adaptive: int | None,
+) -> tuple[
+    list[tuple[Solution, tuple[int, int] | None]],
+    bytes,
+    bytes,
+    bytes,
+    tuple[list[float | None], int, int] | None,
+    bytes,
+    tuple[bytes, int, int] | None,
+]: ...
+def motions(
+    model: Model,
+    parameters: bytes,
+    shares: bool,
+    samples: int,
+    seed: int,
+    tolerance: float,
+    limits: tuple[int | None, float | None],
+) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]], str, dict[str, Any]]: ...
 def ensemble(
     model: Model,
     starts: bytes,

@@ -65,17 +65,7 @@ class Motions:
         return ["motions", self.limits.identity()]
 
     def answer(self, case: Case) -> Answer:
-        found = case.attractors(samples=self.limits.samples, seed=self.limits.seed, **self.limits.options())
-        kinds: dict[str, dict[str, Any]] = {}
-        for own in found:
-            # The first attractor of a kind is the one that most initial states reached.
-            first = kinds.setdefault(kind_of(own), {"number": 0, "period": own["period"], **_maxima(own)})
-            first["number"] += 1
-        said = " + ".join(counted(kinds[kind]["number"], kind) for kind in sorted(kinds))
-        values = {"motions": said or "none", "unsettled": found.unsettled + found.stuck, "escaped": found.escaped}
-        lost = found.unsettled + found.stuck
-        remark = f"{lost} of {found.samples} initial states did not settle" if lost else ""
-        return Answer(values, kinds, remark, {"number": 0})
+        return _motions(case, self.limits, shares=False)
 
     def about(self, model: Model) -> dict[str, dict[str, str]]:
         return {
@@ -99,28 +89,7 @@ class Shares:
         return ["shares", self.limits.identity()]
 
     def answer(self, case: Case) -> Answer:
-        from ._basins import Basins
-
-        found = case.basins(samples=self.limits.samples, seed=self.limits.seed, **self.limits.options())
-        names = [kind_of(own) for own in found.attractors]
-        kinds = sorted(set(names))
-        # Fates of the samples as numbers of kinds; -1 did not settle, -2 escaped.
-        merged = np.array(
-            [kinds.index(names[fate]) if fate >= 0 else -2 if fate in (-2, -3) else -1 for fate in found.fates], dtype=np.int64
-        )
-        joined = Basins(found.model, [], found.samples, merged, None, found.x, found.y, found.cells, None)
-        items: dict[str, dict[str, Any]] = {}
-        for index, kind in enumerate(kinds):
-            share, low, high = joined.share(index)
-            if share > 0:
-                reached = [fate for fate, name in enumerate(names) if name == kind and (found.fates == fate).any()]
-                items[kind] = {"share": share, "share_low": low, "share_high": high, "number": len(reached)}
-        unsettled, escaped = joined.share(-1)[0], joined.share(-2)[0]
-        said = " + ".join(counted(own["number"], kind) for kind, own in items.items())
-        values = {"motions": said or "none", "unsettled": unsettled, "escaped": escaped}
-        none, low, high = joined.share(len(kinds))
-        absent = {"share": none, "share_low": low, "share_high": high, "number": 0}
-        return Answer(values, items, f"{100 * unsettled:.3g} % of the initial states did not settle" if unsettled else "", absent)
+        return _motions(case, self.limits, shares=True)
 
     def about(self, model: Model) -> dict[str, dict[str, str]]:
         return {
@@ -172,23 +141,12 @@ class Points:
 
     def answer(self, case: Case) -> Answer:
         found = case.run(self.tables)
-        if not any(len(branch) for branch in found):
-            told = dict.fromkeys([*found.short, *(note for _, note in found.notes)])
-            raise InputError("; ".join(told) or "the study has no branches")
-        items: dict[str, dict[str, Any]] = {}
-        kinds: dict[str, int] = {}
-        for branch in found:
-            for own in branch.special:
-                # As in `SpecialPoint`, the error is relative to the scale of the parameter.
-                error = own.error * (branch.scale + abs(own.value))
-                items[f"{branch.name}: {own.kind} {own.number}"] = {
-                    "value": own.value, "error": error, "period": own["period"], "unstable_before": own.unstable_before,
-                    "unstable_after": own.unstable_after, **_maxima(own),
-                    "branch": branch.name, "kind": own.kind, "free": branch.free,
-                }  # fmt: skip
-                kinds[own.kind] = kinds.get(own.kind, 0) + 1
-        said = ", ".join(counted(kinds[kind], kind) for kind in sorted(kinds)) or "none"
-        return Answer({"points": said}, items)
+        answer, reason = found._native.answer(found.short)
+        if answer is None:
+            raise InputError(reason)
+        values, items, _, _ = answer
+        # What fell short was heard while the study ran.
+        return Answer(values, dict(items))
 
     def about(self, model: Model) -> dict[str, dict[str, str]]:
         return {
@@ -283,9 +241,16 @@ def _check_free_names(given: Mapping[str, Any], model: Model, names: Sequence[st
             raise ArgumentError(f"the name `{name}` is taken in the result\n  help: another name for this function")
 
 
-def _maxima(found: Solution) -> dict[str, float]:
-    """Largest values of the outputs, or of the states if there are no outputs."""
-    return {f"{name}_max": found[f"{name}_max"] for name in list(found.model.outputs) or list(found.model.states)}
+def _motions(case: Case, limits: Limits, shares: bool) -> Answer:
+    """Attractors by kind, or their basin fractions, as the maps of study files have them."""
+    from . import _native
+    from ._arrays import limits as pair
+
+    values, items, remark, absent = _native.motions(
+        case.model._native, case.model._values(case.given), shares, limits.samples, limits.seed, limits.tolerance,
+        pair(limits.max_steps, limits.max_time),
+    )  # fmt: skip
+    return Answer(values, dict(items), remark, absent)
 
 
 def kind_of(found: Solution) -> str:
@@ -294,13 +259,6 @@ def kind_of(found: Solution) -> str:
     if ratio:
         return f"{ratio[0]}:{ratio[1]} {found.family}"
     return f"period-{found.forcing_periods} {found.family}" if found.forcing_periods > 1 else found.family
-
-
-def counted(number: int, kind: str) -> str:
-    """Returns a number of motions or points of a kind in words: ``"2 equilibria"``."""
-    if number == 1:
-        return kind
-    return f"{number} {kind.removesuffix('um')}a" if kind.endswith("um") else f"{number} {kind}s"
 
 
 def _checked(name: str, value: Any) -> Any:

@@ -62,6 +62,8 @@ def study_at(study: Any, given: Mapping[str, float]) -> dict[str, Any]:
     """Returns the tables of a study with other values of some parameters, wherever it states them."""
     tables = tables_of(study)
     tables["parameters"] = {**(tables.get("parameters") or {}), **given}
+    # A map of the study has values of its own and would be the same in each case.
+    tables.pop("map", None)
     for part in _PARTS:
         if tables.get(part):
             tables[part] = [_item_at(item, given) for item in tables[part]]

@@ -165,7 +165,7 @@ def value(own: Any) -> str:
 
 def study(tables: Mapping[str, Any]) -> str:
     """Writes the text of a study: plain keys, then its lists of tables in the given order."""
-    lists = ("seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design")
+    lists = ("seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design", "map")
     lines = [f"{key(name)} = {value(own)}" for name, own in tables.items() if name not in lists]
     for name, items in tables.items():
         if name in lists:

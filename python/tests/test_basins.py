@@ -25,6 +25,22 @@ def test_cells_opposite_each_other_go_to_opposite_wells(found):
     assert (found.x[0], found.x[-1]) == pytest.approx((-2 + 2 / 30, 2 - 2 / 30))
 
 
+def test_an_adaptive_section_says_which_cells_it_computed(well, found):
+    own = foldline.basins(well, samples=0, plane=("x", "v"), cells=(60, 40), adaptive=8)
+    known, checked, wrong = own.filled
+    assert known.shape == own.cells.shape == (40, 60) and set(np.unique(known)) == {0, 1}
+    assert 0 < checked and wrong <= checked and found.filled is None
+    full = foldline.basins(well, samples=0, plane=("x", "v"), cells=(60, 40))
+    # The attractors may come in another order.
+    off = min((own.cells != full.cells).sum(), (own.cells != 1 - full.cells).sum())
+    # Upper end of Wilson's interval for the error rate of the filled cells.
+    square = 1.96**2
+    rate = (wrong + square / 2 + 1.96 * (wrong * (checked - wrong) / checked + square / 4) ** 0.5) / (checked + square)
+    assert off <= rate * (known == 0).sum()
+    with pytest.raises(foldline.ArgumentError, match="without a plane"):
+        foldline.basins(well, adaptive=8)
+
+
 def test_the_fate_of_a_cell_is_that_of_its_trajectory(well, found):
     column, row = 3, 14
     end = well.simulate([found.x[column], found.y[row]], 200.0, times=[200.0]).states[-1]

@@ -114,6 +114,36 @@ def test_a_latin_hypercube_has_one_value_in_each_part():
     assert cases == foldline.latin_hypercube({"b": (1.0, 3.0), "mu": (-1.0, 0.0)}, 8, seed=3)
 
 
+def rows_of(found, item):
+    """Rows of a data set as a study's map has them: one for each motion or point that exists."""
+    frame = found.to_dataframe().reset_index()
+    return [row for row in frame.to_dict("records") if not item or row.get("number", 1) > 0 or "share" in row]
+
+
+def test_a_map_in_a_study_has_the_same_numbers(cusp):
+    grid = {"b": [0.75, 3.0]}
+    own = dict(name="own", over=grid, samples=32)
+    tables = {
+        **STUDY,
+        "map": [
+            dict(name="points", what="points", over=grid),
+            {**own, "name": "motions", "what": "motions"},
+            {**own, "name": "shares", "what": "shares"},
+        ],
+    }
+    maps = foldline.run(tables, cusp).maps
+    assert list(maps) == ["points", "motions", "shares"]
+    for name, what, item in (("points", STUDY, "point"), ("motions", "motions", "motion"), ("shares", "shares", "motion")):
+        found = foldline.map(cusp, grid, what, samples=32)
+        expected = rows_of(found, item)
+        assert len(maps[name]) == len(expected)
+        for row in maps[name]:
+            other = next(own for own in expected if own["b"] == row["b"] and own[item] == row[item])
+            for key in set(row) & set(other):
+                same = row[key] == other[key] or (row[key] != row[key] and other[key] != other[key])
+                assert same, (name, key, row[key], other[key])
+
+
 # What fails, and what falls short.
 
 

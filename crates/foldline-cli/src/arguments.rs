@@ -392,6 +392,9 @@ pub struct Table {
     /// Answers to design questions
     #[arg(long, group = "what")]
     pub designs: bool,
+    /// Cells of this map over parameters
+    #[arg(long, group = "what", value_name = "NAME")]
+    pub map: Option<String>,
     /// Derivatives of the special points with respect to every parameter
     #[arg(long, group = "what")]
     pub sensitivities: bool,
@@ -440,6 +443,7 @@ pub enum What {
     Branches,
     Responses,
     Designs,
+    Map,
     Notes,
     Sensitivities,
     Uncertainty,
@@ -453,6 +457,7 @@ impl Table {
             (self.branches, What::Branches),
             (self.responses, What::Responses),
             (self.designs, What::Designs),
+            (self.map.is_some(), What::Map),
             (self.notes, What::Notes),
             (self.sensitivities, What::Sensitivities),
             (self.uncertainty, What::Uncertainty),
@@ -523,6 +528,15 @@ pub struct Plot {
     /// Draw only this branch, or the legs of this homotopy; can be repeated
     #[arg(long, value_name = "NAME")]
     pub branch: Vec<String>,
+    /// Draw this map over one or two parameters instead
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "branch", "curves", "window", "unit", "uncertainty", "tornado"])]
+    pub map: Option<String>,
+    /// With --map: quantity to draw [default: what is found in each cell; over one parameter, the first number]
+    #[arg(long, value_name = "NAME", requires = "map")]
+    pub of: Option<String>,
+    /// With --map: motion or special point to draw, such as "2:1 cycle" or "response: fold 1"
+    #[arg(long, value_name = "LABEL", requires = "map")]
+    pub item: Option<String>,
     /// Draw the two-parameter curves in their plane instead of the branches
     #[arg(long, conflicts_with_all = ["uncertainty", "tornado"])]
     pub curves: bool,
@@ -655,6 +669,25 @@ pub struct Basins {
     /// Number of cells along the horizontal axis of the plane, or along both axes as in 512x256
     #[arg(long, value_name = "N", default_value = "256", value_parser = cells, requires = "plane")]
     pub cells: [usize; 2],
+    /// Compute the cells of the plane only where the fate changes, beginning with blocks of N cells; others are filled, and some
+    /// of them checked [default without N: 8]
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "8", requires = "plane",
+          value_parser = clap::value_parser!(u16).range(2..=1024))]
+    pub adaptive: Option<u16>,
+    /// Also find the smallest kick that leads out of each basin: in the plane, or in all states, within their ranges; N directions
+    /// [default without N: 64]
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "64",
+          value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub kicks: Option<u32>,
+    /// Fractions over this parameter instead, with the attractors followed from value to value
+    #[arg(long, value_name = "NAME=FIRST:LAST", allow_hyphen_values = true, conflicts_with_all = ["plane", "kicks"])]
+    pub along: Option<String>,
+    /// With --along: number of values
+    #[arg(long, value_name = "N", default_value_t = 11, requires = "along", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub values: u32,
+    /// With --along: run whose branches give the attractors their names
+    #[arg(long, value_name = "DIR", requires = "along")]
+    pub branches: Option<PathBuf>,
     /// Number of threads [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
@@ -663,8 +696,8 @@ pub struct Basins {
     /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Picture of the plane; the file extension sets the format
-    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf", requires = "plane")]
+    /// Picture of the plane, or of the fractions over a parameter; the file extension sets the format
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: Option<PathBuf>,
     /// File for the cells of the plane, one per line: both states, and the number of the attractor or the reason why there
     /// is none

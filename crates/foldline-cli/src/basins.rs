@@ -12,6 +12,8 @@ use foldline::contract::VectorField;
 use foldline::diagram::{Share, Solution};
 use foldline::explore::System;
 use foldline::explore::basins::{Basins, Plane, basins};
+use foldline::explore::kicks::{Kicking, kicks};
+use foldline::explore::section::adaptive;
 use foldline::model::Model;
 use foldline_plot::basins::{LOST, name, svg};
 use foldline_store::finite::never_finite;
@@ -46,6 +48,17 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
             )
         })?;
     }
+    if typed.output.is_some() && typed.plane.is_none() && typed.along.is_none() {
+        return Err(Failure::typed("--output: there is nothing to draw", "give --plane, or --along"));
+    }
+    if typed.along.is_some() {
+        let limits = system.limits;
+        let ranges = typed.range.iter().map(|text| ranged(text, &model)).collect::<Result<Vec<_>, Failure>>()?;
+        return crate::basins_along::print(typed, &model, &parameters, &|own| {
+            own.limits = limits;
+            ranges.iter().for_each(|(state, range)| own.ranges[*state] = *range);
+        });
+    }
     let plane = typed.plane.as_ref().map(|names| plane(names, typed, &model, &system.ranges)).transpose()?;
     if plane.is_none() && typed.samples == 0 {
         return Err(Failure::typed("--samples 0: nothing is left to compute", "give --plane, or a number of samples"));
@@ -53,11 +66,18 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let jobs = typed.jobs.map_or_else(processors, usize::from);
     let working = SignOfLife::of("following initial states");
     let drawn = (typed.samples as usize, typed.seed);
-    let found = basins(&system, &parameters, plane.as_ref(), drawn, jobs, TOLERANCE);
+    let found = match (&plane, typed.adaptive) {
+        (Some(plane), Some(size)) => adaptive(&system, &parameters, plane, drawn, (jobs, TOLERANCE), usize::from(size)),
+        _ => basins(&system, &parameters, plane.as_ref(), drawn, jobs, TOLERANCE),
+    };
     drop(working);
 
     write(&table(&found, &model, plane.is_some()), typed.format, &mut stdout().lock())?;
     notes(&found)?;
+    let kicked = match typed.kicks {
+        Some(count) => kicked(&found, &system, &parameters, &model, plane.as_ref(), (typed, count, jobs))?,
+        None => true,
+    };
     if let Some(plane) = &plane {
         if let Some(file) = &typed.output {
             picture(&svg(&found, plane, &model, model.iterated()), file)?;
@@ -69,7 +89,67 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     }
     let all = || found.box_fates.iter().chain(&found.plane_fates);
     let short = all().any(|fate| matches!(fate, Fate::Unsettled | Fate::Stuck | Fate::Chatter | Fate::Left));
-    Ok(if short { Outcome::Short } else { Outcome::Done })
+    Ok(if short || !kicked { Outcome::Short } else { Outcome::Done })
+}
+
+/// Prints the smallest kicks that lead out of each basin. Returns false if there is none for some attractor.
+fn kicked(
+    found: &Basins,
+    system: &System,
+    parameters: &[f64],
+    model: &Model,
+    plane: Option<&Plane>,
+    (typed, count, jobs): (&Typed, u32, usize),
+) -> Result<bool, Failure> {
+    let all: Vec<usize> = plane.map_or_else(|| (0..model.states.len()).collect(), |plane| plane.axes.to_vec());
+    let states: Vec<usize> =
+        all.into_iter().filter(|index| system.ranges[*index][0] < system.ranges[*index][1]).collect();
+    let working = SignOfLife::of("kicking");
+    let kicking = Kicking { states: &states, directions: count as usize, seed: typed.seed };
+    let results = kicks(system, parameters, &found.attractors, &kicking, (jobs, TOLERANCE));
+    drop(working);
+    let fate_name = |fate: Fate| match fate {
+        Fate::Settled(k) if k < found.attractors.len() => name(found, k, model.iterated()),
+        Fate::Settled(_) => "another attractor".to_string(),
+        other => LOST.iter().find(|(own, ..)| *own == other).map_or("unknown", |(_, name, _)| *name).to_string(),
+    };
+    let mut columns = vec![Column::new("attractor", Style::Word)];
+    columns.extend([Column::new("kick", Style::Number), Column::new("error", Style::Size)]);
+    let of = |before: &str, index: &usize| {
+        let state = &model.states[*index];
+        Column::in_unit(&format!("{before}{}", state.name), Style::Number, &state.unit)
+    };
+    columns.extend(states.iter().map(|index| of("", index)));
+    columns.extend(states.iter().map(|index| of("change of ", index)));
+    columns.push(Column::new("leads to", Style::Word));
+    let mut rows = Vec::new();
+    let mut whole = true;
+    for (k, result) in results.iter().enumerate() {
+        let mut row = vec![Cell::Word(name(found, k, model.iterated()))];
+        match result {
+            Ok(kick) => {
+                row.extend([kick.size, kick.error].map(Cell::Number));
+                row.extend(states.iter().map(|index| Cell::Number(kick.from[*index])));
+                row.extend(states.iter().map(|index| Cell::Number(kick.change[*index])));
+                row.push(Cell::Word(fate_name(kick.fate)));
+            }
+            Err(reason) => {
+                row.extend((0..2 + 2 * states.len()).map(|_| Cell::Empty));
+                row.push(Cell::Word(reason.clone()));
+                whole = false;
+            }
+        }
+        rows.push(row);
+    }
+    write(&Table { columns, rows }, typed.format, &mut stdout().lock())?;
+    let names: Vec<&str> = states.iter().map(|index| model.states[*index].name.as_str()).collect();
+    writeln!(
+        stderr(),
+        "kick: smallest found in {} directions of {}, in widths of their ranges; parts of other basins between the directions may be nearer",
+        if states.len() == 1 { 2 } else { count as usize },
+        names.join(", ")
+    )?;
+    Ok(whole)
 }
 
 /// Parses `STATE=LOW:HIGH`.
@@ -172,6 +252,19 @@ fn notes(found: &Basins) -> Result<(), Failure> {
         writeln!(
             out,
             "fraction: of {count} initial states drawn uniformly from the ranges, with its 95 % confidence interval"
+        )?;
+    }
+    if let Some(filled) = &found.filled {
+        let [_, most] = filled.error().interval();
+        writeln!(
+            out,
+            "cells: {} of {} computed; of {} filled ones that were checked, {} were wrong: at most {:.2} % of the filled ones are (95 % \
+             confidence)",
+            filled.computed,
+            found.plane_fates.len(),
+            filled.checked,
+            filled.wrong,
+            100.0 * most
         )?;
     }
     if let Some(early) = found.early.as_ref().filter(|early| early.checked > 0) {

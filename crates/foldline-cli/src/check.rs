@@ -27,6 +27,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
             (plan.surveys.len(), "survey"),
             (plan.sweeps.len(), "sweep"),
             (plan.designs.len(), "design question"),
+            (plan.maps.len(), "map"),
         ];
         parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, noun)| many(count, noun)));
         format!("a study of {} with {}", study.model.name, parts.join(", "))

@@ -3,6 +3,7 @@
 mod arguments;
 mod attractors;
 mod basins;
+mod basins_along;
 mod check;
 mod emit;
 mod explore;
@@ -11,6 +12,7 @@ mod failure;
 mod import_auto;
 mod new;
 mod plot;
+mod plot_map;
 mod progress;
 mod reproduce;
 mod rotor;

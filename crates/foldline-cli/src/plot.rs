@@ -24,6 +24,9 @@ const SCALE: f32 = 2.0;
 
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
+    if let Some(name) = &typed.map {
+        return crate::plot_map::write(typed, name);
+    }
     let mut run = read(&typed.folder, Part::Numbers)?;
     let profiled = |name: &Option<String>| {
         let found = name.as_ref().and_then(|name| foldline_plot::axis(name, &run.model).ok());

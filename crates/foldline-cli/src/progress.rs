@@ -35,6 +35,8 @@ struct Live {
     /// Its last position.
     place: String,
     since: Instant,
+    /// Time when the first cell of a map was done.
+    began: Option<Instant>,
 }
 
 impl Live {
@@ -79,6 +81,7 @@ impl Progress {
             Event::Note(branch, note) | Event::Short(branch, note) => self.say(&format!("{branch}: {note}")),
             Event::Visited(name, value, done, of) => self.visited(name, value, done, of),
             Event::Responses(set) => self.responses(set),
+            Event::Mapped(cell, done, of) => self.mapped(&cell.map, done, of),
             Event::Design(design) => {
                 let how = if design.answered() { "answered" } else { "not answered" };
                 self.say(&format!("{}: {how}", design.name));
@@ -107,7 +110,7 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_string());
-        Live { bar, points, special, ends: Vec::new(), place: "starting".into(), since: Instant::now() }
+        Live { bar, points, special, ends: Vec::new(), place: "starting".into(), since: Instant::now(), began: None }
     }
 
     /// Shows the live line of a survey or sweep from its first value on.
@@ -115,6 +118,31 @@ impl Progress {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, 0));
         line.moved(format!("{done:>5} of {of} values   at {:.6}", Shown(value)));
+    }
+
+    /// Shows the live line of a map, with an estimate of the time left from the mean time of its cells so far.
+    fn mapped(&self, name: &str, done: usize, of: usize) {
+        let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, done.saturating_sub(1)));
+        // The number of cells known before, and the time when the first of the others was done.
+        let (before, began) = (line.special, *line.began.get_or_insert_with(Instant::now));
+        let own = done.saturating_sub(before + 1);
+        let left = match own {
+            0 => String::new(),
+            _ => {
+                let seconds = began.elapsed().as_secs_f64() / own as f64 * of.saturating_sub(done) as f64;
+                format!("   about {} left", in_words(seconds))
+            }
+        };
+        line.moved(format!("{done:>5} of {of} cells{left}"));
+        if done < of {
+            return;
+        }
+        if let Some(line) = live.remove(name) {
+            line.bar.finish_and_clear();
+        }
+        drop(live);
+        self.say(&format!("{name:<28} {done:>5} cells"));
     }
 
     fn responses(&self, set: &Responses) {
@@ -199,6 +227,15 @@ impl Progress {
         *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         // A failure to show progress must not stop the computation.
         let _ = if self.terminal { self.lines.println(line) } else { report(line) };
+    }
+}
+
+/// A time in words, to two digits.
+fn in_words(seconds: f64) -> String {
+    match seconds {
+        s if s < 100.0 => format!("{s:.0} s"),
+        s if s < 6000.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.0} h", s / 3600.0),
     }
 }
 

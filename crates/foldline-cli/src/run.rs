@@ -4,14 +4,17 @@ use crate::arguments::{Arguments, Limits, Run as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::table::{conversion, print_special, tell_short};
+use crate::table::{conversion, print_maps, print_special, tell_short};
 use crate::verbosity::report;
 use clap::CommandFactory;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
+use foldline::explore::Plan;
+use foldline::explore::cells::{Asked, carry_out};
 use foldline_plot::Picture;
 use foldline_store::order::ordered;
+use foldline_store::short::finished;
 use foldline_store::run_file::{Recorder, forget_stop, is_asked_to_stop};
 use foldline_store::study_file::{Study, read_study};
 use std::io::{Write, stderr, stdout};
@@ -119,7 +122,13 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     let diagram = std::thread::scope(|scope| {
         scope.spawn(|| clock.run(&watch, folder));
         let _done = Done(&clock);
-        explore::run(&system, &study.plan, jobs, earlier, &watch)
+        let mut diagram = explore::run(&system, &study.plan, jobs, earlier, &watch);
+        let finished = |diagram: Diagram, plan: &Plan| finished(diagram, plan, &study.model);
+        let asked = Asked { model: &study.model, plan: &study.plan, finished: &finished };
+        if !watch.stopping() {
+            diagram.cells = carry_out(&asked, jobs, &diagram.cells, &watch);
+        }
+        diagram
     });
     watch.progress.finish();
     forget_stop(folder);
@@ -135,6 +144,7 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
         Some(conversion) => print_special(&conversion.diagram(diagram.clone()), conversion.model())?,
         None => print_special(&diagram, &study.model)?,
     }
+    print_maps(&diagram, &study.plan)?;
     let whole = tell_short(&diagram, &study.plan, &study.model)?;
     if !study.plan.homotopies.is_empty() {
         report(format_args!("paths of the homotopies: foldline table {} --notes", folder.display()))?;

@@ -46,6 +46,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "held-quantities",
         "how-to",
         "maps",
+        "maps-in-studies",
         "outputs",
         "sensitivities",
         "tutorial-forced-oscillator",

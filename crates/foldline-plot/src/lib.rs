@@ -15,6 +15,7 @@ pub mod figure;
 pub mod font;
 mod frame;
 mod legend;
+pub mod map;
 pub mod page;
 mod paint;
 pub mod palette;

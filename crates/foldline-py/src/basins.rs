@@ -9,14 +9,16 @@ use crate::solution::Solution;
 use foldline::attractors::Fate;
 use foldline::explore::System;
 use foldline::explore::basins::{Plane, basins as found_basins};
+use foldline::explore::section;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 /// Axes, numbers of cells, and a state in the plane, with NaN for values that are not given.
 type Section<'b> = ((usize, usize), (usize, usize), &'b [u8]);
 
-/// Attractors with their ratios, the fates of the samples and of the cells, the samples, the early decisions, and the
-/// ranges.
+/// Attractors with their ratios, the fates of the samples and of the cells, the samples, the early decisions, the ranges,
+/// and of an adaptive section the cells that were computed, the number of filled ones that were checked and of those that
+/// were wrong.
 type Found<'py> = (
     Vec<(Solution, Option<(u32, u32)>)>,
     Bound<'py, PyBytes>,
@@ -24,6 +26,7 @@ type Found<'py> = (
     Bound<'py, PyBytes>,
     Option<(Vec<Option<f64>>, usize, usize)>,
     Bound<'py, PyBytes>,
+    Option<(Bound<'py, PyBytes>, usize, usize)>,
 );
 
 /// Follows `samples` states drawn from `ranges` `[n][2]`, NaN for those of the model, and the cells of a plane.
@@ -40,6 +43,7 @@ pub fn basins<'py>(
     tolerance: f64,
     jobs: usize,
     limits: (Option<usize>, Option<f64>),
+    adaptive: Option<usize>,
 ) -> PyResult<Found<'py>> {
     let parameters = checked(py, model, parameters)?;
     let ranges = read(ranges);
@@ -68,16 +72,25 @@ pub fn basins<'py>(
     let (found, _) = patiently(py, None, &mut |_| Ok(()), move || {
         let mut system = limited(System::of(&own, &parameters), limits);
         system.ranges = own_ranges;
-        found_basins(&system, &parameters, plane.as_ref(), (samples, seed), jobs, tolerance)
+        match (&plane, adaptive) {
+            (Some(plane), Some(size)) => {
+                section::adaptive(&system, &parameters, plane, (samples, seed), (jobs, tolerance), size)
+            }
+            _ => found_basins(&system, &parameters, plane.as_ref(), (samples, seed), jobs, tolerance),
+        }
     })?;
     let attractors = found.attractors.into_iter();
     let attractors = attractors.map(|own| (Solution::new(own.point, &model.model), own.ratio)).collect();
     let samples = integers(py, found.box_fates.iter().map(|fate| number(*fate)))?;
     let cells = integers(py, found.plane_fates.iter().map(|fate| number(*fate)))?;
+    let filled = match found.filled {
+        Some(own) => Some((integers(py, own.known.iter().map(|known| i64::from(*known)))?, own.checked, own.wrong)),
+        None => None,
+    };
     let early = found.early.map(|early| (early.radii, early.checked, early.wrong));
     let drawn = numbers(py, found.samples.into_iter())?;
     let ranges: Vec<f64> = ranges.into_iter().flatten().collect();
-    Ok((attractors, samples, cells, drawn, early, numbers(py, ranges.into_iter())?))
+    Ok((attractors, samples, cells, drawn, early, numbers(py, ranges.into_iter())?, filled))
 }
 
 /// Index of the attractor, or a negative number.

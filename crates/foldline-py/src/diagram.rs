@@ -1,6 +1,7 @@
 //! Results: branches as columns, solutions one by one.
 
 use crate::bytes::{counted, integers, numbers, parts};
+use crate::cells::{Answered, answered, dictionary};
 use crate::failure;
 use crate::saving::save;
 use crate::sensitivity::{Distributions, Row};
@@ -8,8 +9,11 @@ use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::VectorField;
 use foldline::converted::Conversion;
-use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
+use foldline::diagram::{self, Branch, CellValue, Ending, Origin, Point, Share};
+use foldline::explore::MapPlan;
+use foldline::explore::cells::answers;
 use foldline::special::quantity::Quantity;
+use foldline_store::maps::arrays;
 use foldline_store::order::{leg, ordered};
 use foldline_store::run_file::load;
 use foldline_store::short;
@@ -48,6 +52,15 @@ impl Diagram {
 
 #[pymethods]
 impl Diagram {
+    /// Special points as the answer of a cell of a map over parameters; without branches the reason, `short` among it.
+    fn answer<'py>(&self, py: Python<'py>, short: Vec<String>) -> PyResult<(Option<Answered<'py>>, String)> {
+        let notes: Vec<String> = self.notes.iter().map(|(_, note)| note.clone()).collect();
+        match answers::points(&self.diagram, &self.study.model, &short, &notes) {
+            Ok(found) => Ok((Some(answered(py, found)?), String::new())),
+            Err(reason) => Ok((None, reason)),
+        }
+    }
+
     /// Loads the run in a folder.
     #[staticmethod]
     fn load(py: Python, folder: PathBuf) -> PyResult<Diagram> {
@@ -183,6 +196,20 @@ impl Diagram {
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let variables = self.study.model.dim() + self.study.model.output_count();
         self.diagram.responses.iter().map(|set| responses(py, set, variables)).collect()
+    }
+
+    /// Maps over parameters by name: a row for each motion or special point of each cell.
+    fn maps<'py>(&self, py: Python<'py>) -> PyResult<Vec<(String, Vec<Bound<'py, PyDict>>)>> {
+        let rows = |map: &MapPlan| {
+            let listed = arrays(map, &self.diagram.cells, &self.study.model).listed();
+            let names: Vec<String> = listed.columns.into_iter().map(|column| column.name).collect();
+            let row = |row: Vec<Option<CellValue>>| {
+                let known = names.iter().zip(row).filter_map(|(name, value)| Some((name.clone(), value?)));
+                dictionary(py, &known.collect())
+            };
+            Ok((map.name.clone(), listed.rows.into_iter().map(row).collect::<PyResult<_>>()?))
+        };
+        self.study.plan.maps.iter().map(rows).collect()
     }
 
     /// Answers to design questions, one table each.

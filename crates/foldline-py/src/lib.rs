@@ -15,6 +15,7 @@
 
 mod basins;
 mod bytes;
+mod cells;
 mod diagram;
 mod ensemble;
 mod failure;
@@ -35,6 +36,8 @@ use pyo3::prelude::*;
 mod _native {
     #[pymodule_export]
     use crate::basins::basins;
+    #[pymodule_export]
+    use crate::cells::motions;
     #[pymodule_export]
     use crate::diagram::Diagram;
     #[pymodule_export]

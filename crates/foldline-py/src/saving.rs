@@ -18,6 +18,7 @@ pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, S
     diagram.shortfalls.iter().for_each(|own| tell(Event::Short(&own.about, &own.what)));
     diagram.responses.iter().for_each(|set| tell(Event::Responses(set)));
     diagram.designs.iter().for_each(|design| tell(Event::Design(design)));
+    diagram.cells.iter().enumerate().for_each(|(k, cell)| tell(Event::Mapped(cell, k + 1, diagram.cells.len())));
     recorder.complete()
 }
 

@@ -8,7 +8,8 @@ use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{self, Branch, Point, Shown};
-use foldline::explore;
+use foldline::explore::cells::{Asked, carry_out};
+use foldline::explore::{self, Plan};
 use foldline_store::run_file::{Recorder, RunFileError, path_in};
 use foldline_store::{short, study_file};
 use pyo3::prelude::*;
@@ -55,7 +56,12 @@ pub fn run(
     let own = Arc::clone(&study);
     let work = move || {
         let system = explore::System::of_plan(&own.model, &own.plan);
-        let diagram = explore::run_from(&system, &own.plan, jobs, earlier, &given, &watch);
+        let mut diagram = explore::run_from(&system, &own.plan, jobs, earlier, &given, &watch);
+        let finished = |diagram: diagram::Diagram, plan: &Plan| short::finished(diagram, plan, &own.model);
+        let asked = Asked { model: &own.model, plan: &own.plan, finished: &finished };
+        if !watch.stopping() {
+            diagram.cells = carry_out(&asked, jobs, &diagram.cells, &watch);
+        }
         drop(system);
         let close = if watch.stop.load(Ordering::Relaxed) { Recorder::finish } else { Recorder::complete };
         let stored = watch.recorder.map(close);
@@ -138,6 +144,7 @@ impl Observer for Watch {
             Event::Visited(name, value, done, of) => {
                 seen().place = format!("{name}: {done} of {of} values, at {:.6}", Shown(value))
             }
+            Event::Mapped(cell, done, of) => seen().place = format!("{}: {done} of {of} cells", cell.map),
             Event::Note(about, note) | Event::Short(about, note) => {
                 let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
                 notes.push((about.to_string(), note.to_string()));

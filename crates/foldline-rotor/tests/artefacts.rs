@@ -49,6 +49,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         surveys: Vec::new(),
         sweeps: Vec::new(),
         designs: Vec::new(),
+        maps: Vec::new(),
         record: Vec::new(),
     };
     let system = System::new(&field);

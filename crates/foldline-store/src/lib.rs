@@ -10,6 +10,7 @@ pub mod diagnostic;
 mod elsewhere;
 pub mod export;
 pub mod finite;
+pub mod maps;
 pub mod model_file;
 pub mod nearest;
 pub mod order;

@@ -1,6 +1,6 @@
 //! Requests of a study that were not fulfilled.
 
-use crate::order::{is_run, leg};
+use crate::order::{is_run, leg, ordered};
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall, Shown};
 use foldline::explore::{DesignPlan, HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
@@ -20,6 +20,7 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     }
     lines.extend(plan.sweeps.iter().filter_map(|sweep| cut_off(diagram, sweep, model)));
     lines.extend(plan.designs.iter().filter_map(|design| unanswered(diagram, design, model)));
+    lines.extend(crate::maps::short(plan, &diagram.cells));
     let targets = targets(plan);
     for branch in &diagram.branches {
         // Answers to design questions say what their runs leave open.
@@ -40,6 +41,13 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
         }
     }
     lines
+}
+
+/// Returns a diagram in the order in which it is shown, with the messages on what was not fulfilled.
+pub fn finished(diagram: Diagram, plan: &Plan, model: &Model) -> (Diagram, Vec<String>) {
+    let diagram = ordered(diagram, plan);
+    let lines = lines(&diagram, plan, model);
+    (diagram, lines)
 }
 
 /// Names of branches and curves, with the target parameter and value of each.

@@ -66,6 +66,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         surveys: Vec::new(),
         sweeps: Vec::new(),
         designs: Vec::new(),
+        maps: Vec::new(),
         record: Vec::new(),
     }
 }

@@ -3,6 +3,7 @@
 mod columns;
 mod designs;
 mod format;
+mod maps;
 mod responses;
 mod sensitivity;
 mod susceptibility;
@@ -14,7 +15,7 @@ use crate::failure::{Failure, Outcome};
 use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
-use foldline::explore::plan::Plan;
+use foldline::explore::plan::{MapPlan, Plan};
 use foldline::model::{Model, Spread};
 use foldline::special::quantity::{Quantity, append};
 use foldline_store::nearest::suggest;
@@ -86,7 +87,7 @@ pub enum Cell {
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let part = match typed.what() {
         What::Points | What::Branches => Part::Numbers,
-        What::Special | What::Responses | What::Designs | What::Notes => Part::Special,
+        What::Special | What::Responses | What::Designs | What::Map | What::Notes => Part::Special,
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
         What::Susceptibility => return susceptibility::print(typed),
     };
@@ -113,6 +114,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
             branch.points.iter_mut().chain(special).for_each(|point| append(point, &recorded, &run.model));
         }
     }
+    if typed.map.is_some() && !typed.unit.is_empty() {
+        return Err(Failure::typed("--unit: maps are in the units of the model", "leave out --unit"));
+    }
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let conversion = conversion(&run.model, &typed.unit)?;
     let shown = conversion.as_ref().map(|own| own.diagram(run.diagram.clone()));
@@ -124,6 +128,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special => columns::special(diagram, model, &record, &kept),
         What::Responses => responses::responses(diagram, model),
         What::Designs => designs::designs(diagram, model),
+        What::Map => maps::cells(map_of(&run.plan, typed.map.as_deref().unwrap_or_default())?, diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
         What::Sensitivities | What::Uncertainty => return sensitivity::print(typed),
         What::Susceptibility => return susceptibility::print(typed),
@@ -180,6 +185,14 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
     }
 }
 
+/// Prints the maps of a run, one line for each.
+pub fn print_maps(diagram: &Diagram, plan: &Plan) -> std::io::Result<()> {
+    match plan.maps.is_empty() {
+        true => Ok(()),
+        false => format::text(&maps::summary(diagram, plan), &mut stdout().lock()),
+    }
+}
+
 /// Prints the special points as text, and a line for each survey and sweep.
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
@@ -225,6 +238,18 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
     let (spreads, uncertainty) = (study.spreads, study.uncertainty);
     Ok(Run { model: study.model, plan: study.plan, diagram, notes, spreads, uncertainty })
+}
+
+/// Returns the map of that name.
+pub fn map_of<'p>(plan: &'p Plan, name: &str) -> Result<&'p MapPlan, Failure> {
+    plan.maps.iter().find(|own| own.name == name).ok_or_else(|| {
+        let names: Vec<&str> = plan.maps.iter().map(|own| own.name.as_str()).collect();
+        let cure = match names.is_empty() {
+            true => "the study has no `[[map]]`".to_string(),
+            false => suggest(name, &names),
+        };
+        Failure::typed(format!("--map: the run has no map \"{name}\""), cure)
+    })
 }
 
 /// Selects the branches meant by a name given on the command line; all of them without a name.

@@ -111,7 +111,7 @@ impl Planned<'_> {
         }
         for (k, column) in more.iter().enumerate() {
             if column.class == Class::Text {
-                let id = plan.texts(group, &column.name, points, rows.iter().map(|row| text_of(&row[k])));
+                let id = plan.texts(group, &column.name, &[points], rows.iter().map(|row| text_of(&row[k])));
                 describe(plan, id, column);
                 out.scalars.push(Growth::new(id, Class::Text));
             } else {

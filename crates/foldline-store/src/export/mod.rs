@@ -12,6 +12,7 @@ mod columns;
 mod csv;
 mod groups;
 pub mod hdf5;
+mod maps;
 mod netcdf;
 mod parquet;
 mod tables;

@@ -19,6 +19,8 @@ use std::path::{Path, PathBuf};
 struct Numbers {
     tables: Vec<(Vec<Growth>, Vec<Vec<Cell>>)>,
     branches: Vec<[Group; 2]>,
+    /// Variables of maps, with their elements.
+    arrays: Vec<(Growth, Vec<Cell>)>,
 }
 
 /// Writes the file.
@@ -33,6 +35,10 @@ pub(super) fn write(export: &Export, path: &Path) -> Result<Vec<PathBuf>, Export
             columns.iter_mut().zip(row).try_for_each(|(c, cell)| c.add(cell, &mut laid)).map_err(failed)?;
         }
         columns.iter_mut().try_for_each(|c| c.flush(&mut laid)).map_err(failed)?;
+    }
+    for (variable, cells) in &mut numbers.arrays {
+        cells.iter().try_for_each(|cell| variable.add(cell, &mut laid)).map_err(failed)?;
+        variable.flush(&mut laid).map_err(failed)?;
     }
     let model = export.model();
     for (branch, [points, special]) in export.diagram.branches.iter().zip(&mut numbers.branches) {
@@ -55,7 +61,7 @@ pub(super) fn write(export: &Export, path: &Path) -> Result<Vec<PathBuf>, Export
 
 fn planned(export: &Export, variables: &Variables) -> Result<(Plan, Numbers), ExportError> {
     let mut plan = Plan::default();
-    let mut numbers = Numbers { tables: Vec::new(), branches: Vec::new() };
+    let mut numbers = Numbers { tables: Vec::new(), branches: Vec::new(), arrays: Vec::new() };
     about(export, &mut plan);
     let branches = &export.diagram.branches;
     let mut extents = Vec::with_capacity(branches.len());
@@ -67,6 +73,10 @@ fn planned(export: &Export, variables: &Variables) -> Result<(Plan, Numbers), Ex
     let sets = &export.diagram.responses;
     let names = branches.iter().map(|b| &b.name).chain(sets.iter().map(|set| &set.name));
     let groups: Vec<String> = names.map(|name| free_name(group_name(name), &mut taken)).collect();
+    for map in super::maps::of_run(export) {
+        let name = free_name(group_name(&map.0), &mut taken);
+        numbers.arrays.extend(super::maps::group(&mut plan, &name, &map));
+    }
     if !branches.is_empty() {
         let model = export.model();
         let rows = branches.iter().zip(&extents).zip(&groups).map(|((branch, [points, _]), group)| {
@@ -136,7 +146,7 @@ fn table(
     let dimension = plan.dimension(group, dimension, rows.len() as u64, None);
     let column = |(k, column): (usize, &Column)| {
         let id = match column.class {
-            Class::Text => plan.texts(group, &column.name, dimension, rows.iter().map(|row| text_of(&row[k]))),
+            Class::Text => plan.texts(group, &column.name, &[dimension], rows.iter().map(|row| text_of(&row[k]))),
             class => plan.variable(group, &column.name, element(class), &[dimension]),
         };
         describe(plan, id, column);

@@ -26,6 +26,7 @@ pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec
     if !export.diagram.responses.is_empty() {
         done.push(responses(export, folder, begin, &variables)?);
     }
+    done.extend(super::maps::write(export, folder, begin)?);
     if let Some(entries) = &export.sensitivities {
         done.push(sensitivities(entries, folder, begin)?);
     }

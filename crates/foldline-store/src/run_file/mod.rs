@@ -12,6 +12,7 @@
 //! * The tables are described in docs/book/run-file.md. `PRAGMA user_version` is [`FORMAT_VERSION`].
 
 mod bytes;
+mod cells;
 mod designs;
 mod halt;
 mod meta;

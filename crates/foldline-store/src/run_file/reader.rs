@@ -256,6 +256,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
     }
     diagram.responses = super::responses::load(connection, path)?;
     diagram.designs = super::designs::load(connection, path)?;
+    diagram.cells = super::cells::load(connection, path)?;
     diagram.shortfalls = shortfalls(connection, path)?;
     Ok(diagram)
 }

@@ -445,6 +445,7 @@ impl Observer for Recorder {
                 self.write(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown));
             }
             Event::Design(design) => self.write(|state| super::designs::write(&state.connection, design)),
+            Event::Mapped(cell, ..) => self.write(|state| super::cells::write(&state.connection, cell)),
             Event::End(_) | Event::Visited(..) => {}
         }
         if self.failed.load(Ordering::Acquire) { Verdict::Stop } else { Verdict::Continue }

@@ -5,12 +5,12 @@
 
 use super::Study;
 use foldline::diagram::Kind;
-use foldline::explore::{BranchPlan, Plan, Switching};
+use foldline::explore::{BranchPlan, Plan, Question, Switching};
 
 /// Requests that a study has beyond those of an earlier one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Added {
-    /// Names of branches, curves, homotopies, explorations, surveys, sweeps and design questions.
+    /// Names of branches, curves, homotopies, explorations, surveys, sweeps, design questions and maps.
     pub items: Vec<String>,
     /// Further switching: the name of the parent branch, the kind of the special points, and the number of one of them
     /// if not all are meant.
@@ -46,9 +46,15 @@ pub fn added(old: &Study, new: &Study) -> Result<Added, String> {
         first("sweep", &a.sweeps, &b.sweeps, |own| &own.name, |x, y| x == y)?,
         first("design question", &a.designs, &b.designs, |own| &own.name, |x, y| x == y)?,
     ];
-    found.items = more.concat();
+    let maps = first("map", &a.maps, &b.maps, |own| &own.name, |x, y| x == y)?;
+    found.items = [more.concat(), maps.clone()].concat();
     for (x, y) in a.branches.iter().zip(&b.branches) {
         found.switched.extend(further(&x.switching, &y.switching).map(|(kind, n)| (x.name.clone(), kind, n)));
+    }
+    // The answers in the cells of such a map are about all branches.
+    let of_branches = a.maps.iter().find(|own| own.question == Question::Points);
+    if let Some(map) = of_branches.filter(|_| found.items.len() > maps.len() || !found.switched.is_empty()) {
+        return Err(format!("the map \"{}\" shows the special points of all branches, of which there are more", map.name));
     }
     Ok(found)
 }

@@ -71,7 +71,7 @@ pub(super) fn read<'g>(
         all.extend(walk.tables(root, what).into_iter().map(|(span, table)| Item { what, span, table }));
     }
     all.sort_by_key(|item| item.span.start);
-    if ["branch", "homotopy", "explore", "survey", "sweep"]
+    if ["branch", "homotopy", "explore", "survey", "sweep", "map"]
         .iter()
         .all(|what| root.get(*what).is_none_or(|v| v.get_ref().as_array().is_some_and(|list| list.is_empty())))
     {

@@ -2,7 +2,7 @@
 //!
 //! **Idea.** A study specifies in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`),
 //! branches (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`), whole diagrams
-//! (`[[explore]]`) and simulations (`[[survey]]`, `[[sweep]]`). The whole text is read before it is rejected, so that
+//! (`[[explore]]`), simulations (`[[survey]]`, `[[sweep]]`) and maps over parameters (`[[map]]`). The whole text is read before it is rejected, so that
 //! all mistakes are reported at once, each with position, cause and cure. The format is described in
 //! docs/book/study-files.md.
 
@@ -15,6 +15,7 @@ mod grown;
 mod holds;
 mod homotopies;
 mod items;
+mod maps;
 mod near;
 mod profiles;
 mod responses;
@@ -74,7 +75,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 20] = [
+const ROOT_KEYS: [&str; 21] = [
     "model",
     "title",
     "description",
@@ -95,6 +96,7 @@ const ROOT_KEYS: [&str; 20] = [
     "survey",
     "sweep",
     "design",
+    "map",
 ];
 
 /// Reads a study file and the model that it names. On failure, returns every mistake found.
@@ -203,7 +205,7 @@ pub fn is_study(text: &str) -> bool {
     if root.get_ref().contains_key("equations") {
         return false;
     }
-    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design"];
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design", "map"];
     keys.iter().any(|key| root.get_ref().contains_key(*key))
 }
 
@@ -253,6 +255,8 @@ fn parse(
     let taken: Vec<&str> = taken.iter().copied().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
     let taken: Vec<&str> = taken.into_iter().chain(explorations.iter().map(|e| e.name.as_str())).collect();
     let designs = designs::read(&mut walk, &root, &ground, &explorations, &taken);
+    let taken: Vec<&str> = taken.into_iter().chain(designs.iter().map(|own| own.name.as_str())).collect();
+    let maps = maps::read(&mut walk, &root, &ground, &explorations, &defaults, &taken);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
         check_totals(&mut walk, &root, &model);
     }
@@ -278,6 +282,7 @@ fn parse(
         surveys,
         sweeps,
         designs,
+        maps,
         record,
     };
     Ok(Study {
@@ -296,7 +301,7 @@ fn parse(
 /// Reports what is not supported with two forcing frequencies.
 fn one_forcing(walk: &mut Walk, root: &DeTable) {
     designs::refuse(walk, root, "models with two forcing frequencies");
-    for key in ["explore", "survey", "sweep", "curve", "homotopy"] {
+    for key in ["explore", "survey", "sweep", "curve", "homotopy", "map"] {
         let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
         let message = format!("`{key}` is not supported for models with two forcing frequencies");
         walk.report(span, message, "follow the tori with `[[seed]]`, `attractor = \"torus\"`, and `[[branch]]`");
@@ -530,7 +535,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed, branch, curve, homotopy, exploration, survey, sweep and design question a name of its own",
+            "give every seed, branch, curve, homotopy, exploration, survey, sweep, design question and map a name of its own",
         );
     }
     Some(name)
@@ -579,5 +584,6 @@ mod tests {
         assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
         assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
         assert_eq!(keys("/$defs/design/properties"), sorted(&designs::KEYS));
+        assert_eq!(keys("/$defs/map/properties"), sorted(&maps::KEYS));
     }
 }

@@ -101,7 +101,7 @@ fn unit_of(free: Option<usize>, model: &Model) -> &str {
 
 /// Reads the values of the free parameter: a list, or equally spaced values in a range, which must be increasing if
 /// `rising` is true.
-fn values(
+pub(super) fn values(
     walk: &mut Walk,
     table: &DeTable,
     span: &Range<usize>,

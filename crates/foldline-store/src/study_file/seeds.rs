@@ -6,7 +6,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::diagram::Shown;
-use foldline::explore::{AttractorKey, SeedPlan, SeedSource, iterates};
+use foldline::explore::{AttractorKey, Drawn, SeedPlan, SeedSource, iterates};
 use foldline::model::{Model, unsupported};
 use foldline::problem::map::cycle_of;
 use std::collections::HashMap;
@@ -17,6 +17,8 @@ pub(super) const KEYS: [&str; 10] =
     ["name", "description", "attractor", "periods", "state", "cycle", "torus", "parameters", "samples", "random"];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
+/// Default number of initial states in a cell of a map.
+pub(super) const SAMPLES_OF_MAP: usize = 64;
 
 /// Reads every seed, with its position in the text. A seed with mistakes is kept, so that branches that start from it
 /// are not reported too.
@@ -54,6 +56,31 @@ pub(super) fn read(
         seeds.push((span, SeedPlan { name, source, parameters, samples, random: random.unwrap_or(RANDOM) }));
     }
     seeds
+}
+
+/// Reads the start from which a motion settles in the cells of a map: by default a cycle of a forced model, a fixed point of
+/// a map, otherwise an equilibrium.
+pub(super) fn start_of_map(
+    walk: &mut Walk,
+    table: &DeTable,
+    span: &Range<usize>,
+    model: &Model,
+    parameters: &[f64],
+    drawn: Drawn,
+) -> Option<SeedPlan> {
+    const DEGREE: usize = 4;
+    let before = walk.found.len();
+    let given = ["attractor", "state"].iter().any(|key| table.contains_key(*key));
+    let meant = match given {
+        true => source(walk, table, span, model, DEGREE, parameters),
+        false if model.iterated() => SeedSource::Attractor(AttractorKey::Lasting(1)),
+        false if model.forced() => SeedSource::Attractor(AttractorKey::Cycle),
+        false => SeedSource::Attractor(AttractorKey::Equilibrium),
+    };
+    let source = lasting(walk, table, meant, model, parameters);
+    let Drawn { samples, random } = drawn;
+    let seed = SeedPlan { name: "start".into(), source, parameters: parameters.to_vec(), samples, random };
+    (walk.found.len() == before).then_some(seed)
 }
 
 fn source(

@@ -70,24 +70,34 @@ impl Sampling {
     /// Initial states `[samples][n]` all of which are distributed uniformly in the box. Being stratified, they give
     /// fractions at least as accurate as one state fewer drawn independently (owen1997).
     pub fn uniform_starts(&self) -> Vec<f64> {
-        self.stratified(&mut SplitMix64(self.seed))
+        stratified(&self.ranges, self.samples, self.seed)
     }
 
     fn stratified(&self, random: &mut SplitMix64) -> Vec<f64> {
-        let n = self.ranges.len();
-        let mut starts = vec![0.0; self.samples * n];
-        for (i, [low, high]) in self.ranges.iter().enumerate() {
-            let mut strata: Vec<usize> = (0..self.samples).collect();
-            for k in (1..strata.len()).rev() {
-                strata.swap(k, (random.next() % (k as u64 + 1)) as usize);
-            }
-            for (s, stratum) in strata.iter().enumerate() {
-                let place = (*stratum as f64 + random.fraction()) / self.samples as f64;
-                starts[s * n + i] = low + place * (high - low);
-            }
-        }
-        starts
+        drawn(&self.ranges, self.samples, random)
     }
+}
+
+/// Returns a Latin hypercube `[samples][n]` in a box `[n]`: every component has one value in each of `samples` equal parts
+/// of its range.
+pub fn stratified(ranges: &[[f64; 2]], samples: usize, seed: u64) -> Vec<f64> {
+    drawn(ranges, samples, &mut SplitMix64(seed))
+}
+
+fn drawn(ranges: &[[f64; 2]], samples: usize, random: &mut SplitMix64) -> Vec<f64> {
+    let n = ranges.len();
+    let mut starts = vec![0.0; samples * n];
+    for (i, [low, high]) in ranges.iter().enumerate() {
+        let mut strata: Vec<usize> = (0..samples).collect();
+        for k in (1..strata.len()).rev() {
+            strata.swap(k, (random.next() % (k as u64 + 1)) as usize);
+        }
+        for (s, stratum) in strata.iter().enumerate() {
+            let place = (*stratum as f64 + random.fraction()) / samples as f64;
+            starts[s * n + i] = low + place * (high - low);
+        }
+    }
+    starts
 }
 
 /// A random number generator with a state of 64 bits.

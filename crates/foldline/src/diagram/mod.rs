@@ -3,6 +3,7 @@
 mod conservative;
 mod cycle;
 mod design;
+mod mapped;
 mod number;
 mod record;
 mod response;
@@ -12,6 +13,7 @@ mod torus;
 
 pub use cycle::Cycle;
 pub use design::{Answer, Binds, Design};
+pub use mapped::{CellAnswer, CellValue, CellValues, MapCell};
 pub use number::Shown;
 pub use record::{Misfit, Record};
 pub use response::{Motion, Recognition, Response, Responses, Search};
@@ -1022,6 +1024,8 @@ pub struct Diagram {
     pub responses: Vec<Responses>,
     /// Answers to design questions.
     pub designs: Vec<Design>,
+    /// Cells of maps over parameters.
+    pub cells: Vec<MapCell>,
     /// Requests that were not fulfilled, in addition to branches that ended short.
     pub shortfalls: Vec<Shortfall>,
 }

@@ -36,16 +36,19 @@ impl Plane {
         low + (cell as f64 + 0.5) / self.cells[axis] as f64 * (high - low)
     }
 
+    /// State `[n]` at the centre of a cell.
+    pub fn state(&self, column: usize, row: usize) -> Vec<f64> {
+        let mut state = self.through.clone();
+        state[self.axes[0]] = self.centre(0, column);
+        state[self.axes[1]] = self.centre(1, row);
+        state
+    }
+
     /// `[rows × columns][n]` states at the centres, row by row from below.
     pub fn starts(&self) -> Vec<f64> {
         let mut starts = Vec::with_capacity(self.cells[0] * self.cells[1] * self.through.len());
         for row in 0..self.cells[1] {
-            for column in 0..self.cells[0] {
-                let from = starts.len();
-                starts.extend_from_slice(&self.through);
-                starts[from + self.axes[0]] = self.centre(0, column);
-                starts[from + self.axes[1]] = self.centre(1, row);
-            }
+            (0..self.cells[0]).for_each(|column| starts.extend(self.state(column, row)));
         }
         starts
     }
@@ -64,9 +67,47 @@ pub struct Basins {
     pub early: Option<Early>,
     /// States drawn from the box `[samples][n]`.
     pub samples: Vec<f64>,
+    /// Cells that were filled instead of computed, if the section is adaptive.
+    pub filled: Option<Filled>,
+}
+
+/// Filled cells of a section that was computed where the fate changes ([`super::section`]).
+#[derive(Clone, Debug)]
+pub struct Filled {
+    /// Number of cells that were computed.
+    pub computed: usize,
+    /// For each cell, row by row from below: true if it was computed.
+    pub known: Vec<bool>,
+    /// Number of cells that would have been filled and were computed to check that.
+    pub checked: usize,
+    /// Number of those with another fate.
+    pub wrong: usize,
+}
+
+impl Filled {
+    /// Fraction of the filled cells with a wrong fate, estimated from those checked.
+    pub fn error(&self) -> Share {
+        Share { hits: self.wrong, of: self.checked }
+    }
 }
 
 impl Basins {
+    /// Returns the basins with the attractors in the order of [`super::attractors`]: equilibria, then cycles, each by decreasing hits.
+    pub(super) fn sorted(self) -> Basins {
+        let mut order: Vec<usize> = (0..self.attractors.len()).collect();
+        let cycle = |k: &usize| self.attractors[*k].point.solution.period().is_some();
+        order.sort_by_key(|k| (cycle(k), std::cmp::Reverse(self.attractors[*k].hits)));
+        let mut place = vec![0; order.len()];
+        order.iter().enumerate().for_each(|(new, old)| place[*old] = new);
+        let moved = |fates: &[Fate]| -> Vec<Fate> {
+            let one = |fate: &Fate| if let Fate::Settled(k) = fate { Fate::Settled(place[*k]) } else { *fate };
+            fates.iter().map(one).collect()
+        };
+        let (box_fates, plane_fates) = (moved(&self.box_fates), moved(&self.plane_fates));
+        let attractors = order.iter().map(|k| self.attractors[*k].clone()).collect();
+        Basins { attractors, box_fates, plane_fates, ..self }
+    }
+
     /// Fraction of the box whose states have this fate.
     pub fn share(&self, fate: Fate) -> Share {
         share(&self.box_fates, fate)
@@ -104,11 +145,18 @@ pub fn basins(
     let mut fates = vec![Fate::Left; count];
     order.iter().zip(&census.fates).for_each(|(k, fate)| fates[*k] = *fate);
     let plane_fates = fates.split_off(samples.min(count));
-    Basins { attractors: census.attractors, box_fates: fates, plane_fates, early: census.early, samples: drawn }
+    Basins {
+        attractors: census.attractors,
+        box_fates: fates,
+        plane_fates,
+        early: census.early,
+        samples: drawn,
+        filled: None,
+    }
 }
 
 /// Numbers from 0 to `count` - 1 in an order in which any first part is spread over all.
-fn spread(count: usize) -> Vec<usize> {
+pub(super) fn spread(count: usize) -> Vec<usize> {
     fn divisor(a: usize, b: usize) -> usize {
         if b == 0 { a } else { divisor(b, a % b) }
     }

@@ -18,6 +18,11 @@ impl<'f> Counted<'f> {
         Counted { field, evaluations: AtomicUsize::new(0), linearisations: AtomicUsize::new(0) }
     }
 
+    /// Returns the number of points at which f or derivatives were evaluated so far.
+    pub(super) fn total(&self) -> usize {
+        self.evaluations.load(Ordering::Relaxed).saturating_add(self.linearisations.load(Ordering::Relaxed))
+    }
+
     /// Returns the numbers of points at which f, and at which derivatives were evaluated since the last call.
     pub(super) fn take(&self) -> [usize; 2] {
         [&self.evaluations, &self.linearisations].map(|counter| counter.swap(0, Ordering::Relaxed))

@@ -25,14 +25,19 @@
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | which value of a parameter keeps a motion away? | `design` |
 //! | what does simulation find? | [`responses`] |
+//! | how does all this depend on other parameters? | [`cells`] |
+//! | which attractor does an initial state lead to? | [`basins`], in planes [`section`], over a parameter [`along`], by `rounds` |
+//! | which kick leads out of a basin? | [`kicks`] |
 
 mod accounts;
+pub mod along;
 mod arcs;
 mod arrival;
 mod averaged;
 mod axis;
 pub mod basins;
 mod bounces;
+pub mod cells;
 mod choice;
 mod connections;
 mod corner;
@@ -52,6 +57,7 @@ mod holds;
 pub mod homotopy;
 mod impacts;
 mod interrupt;
+pub mod kicks;
 pub mod known;
 mod lookout;
 mod maps;
@@ -65,7 +71,9 @@ pub mod recognised;
 mod repointed;
 mod resonances;
 mod responses;
+mod rounds;
 mod schedule;
+pub mod section;
 pub mod seeds;
 mod shooting;
 mod sizes;
@@ -86,8 +94,8 @@ pub use given::mismatch;
 pub use maps::iterates;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, DesignPlan, ExplorePlan, HomotopyPlan, Near, Plan, SeedPlan, SeedSource,
-    Start, SurveyPlan, SweepPlan, Switching, Wanted,
+    AttractorKey, BranchPlan, CurvePlan, DesignPlan, Drawn, ExplorePlan, HomotopyPlan, MapPlan, Near, Over, Plan,
+    Question, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan, Switching, Wanted,
 };
 pub use seeds::{attractors, first_solution, unsettled_motions};
 pub use sizes::{scales_from, state_scales};
@@ -150,5 +158,5 @@ pub fn run_from(
     let responses = responses::simulate(system, plan, &seeds, jobs, &branches, &earlier, observer);
     let (legs, designs) = design::answers(system, plan, jobs, &branches, &earlier, observer);
     branches.extend(legs);
-    Diagram { branches, responses, designs, shortfalls: observer.shortfalls() }
+    Diagram { branches, responses, designs, cells: earlier.cells.clone(), shortfalls: observer.shortfalls() }
 }

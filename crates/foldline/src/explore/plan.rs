@@ -1,5 +1,6 @@
 //! Requests of a study, in terms of the model.
 
+use super::cells::answers::Reading;
 use crate::attractors::Limits;
 use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
@@ -292,6 +293,58 @@ pub struct DesignPlan {
     pub max_points: usize,
 }
 
+/// Initial states to sample in a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Drawn {
+    /// Their number.
+    pub samples: usize,
+    /// Seed of the random numbers.
+    pub random: u64,
+}
+
+/// Question that a map asks in each cell.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Question {
+    /// The special points of the study's branches.
+    Points,
+    /// The attractors.
+    Motions(Drawn),
+    /// The fractions of their basins.
+    Shares(Drawn),
+    /// These quantities of the motion that settles from this start.
+    Settled(Vec<(String, Reading)>, SeedPlan),
+}
+
+/// Cells of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Over {
+    /// All combinations of values of each parameter.
+    Grid(Vec<Vec<f64>>),
+    /// `[case][q]` values of the parameters.
+    Cases(Vec<Vec<f64>>),
+}
+
+/// A map over parameters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapPlan {
+    /// Unique name.
+    pub name: String,
+    /// `[q]` names of its parameters.
+    pub names: Vec<String>,
+    /// `[q]` their indices.
+    pub indices: Vec<usize>,
+    /// Every parameter value `[k]`, those of the map ignored.
+    pub base: Vec<f64>,
+    /// The cells.
+    pub over: Over,
+    /// Number of times that the steps of a grid are halved where the answer changes.
+    pub refine: usize,
+    /// The question.
+    pub question: Question,
+    /// Limit on the evaluations of f and its derivatives in a cell.
+    pub most: usize,
+}
+
 /// All requests of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -319,6 +372,8 @@ pub struct Plan {
     pub sweeps: Vec<SweepPlan>,
     /// Design questions.
     pub designs: Vec<DesignPlan>,
+    /// Maps over parameters.
+    pub maps: Vec<MapPlan>,
     /// Further columns of tables and exports: names and quantities.
     pub record: Vec<(String, Quantity)>,
 }
@@ -347,6 +402,7 @@ impl Plan {
             surveys: Vec::new(),
             sweeps: Vec::new(),
             designs: Vec::new(),
+            maps: Vec::new(),
             record: Vec::new(),
         }
     }

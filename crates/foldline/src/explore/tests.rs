@@ -65,6 +65,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         surveys: Vec::new(),
         sweeps: Vec::new(),
         designs: Vec::new(),
+        maps: Vec::new(),
         record: Vec::new(),
     };
     let archive = Archive { keeps, points: Mutex::new(Vec::new()) };

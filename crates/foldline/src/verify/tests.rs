@@ -56,6 +56,7 @@ fn computed(model: &Model) -> Diagram {
         surveys: Vec::new(),
         sweeps: Vec::new(),
         designs: Vec::new(),
+        maps: Vec::new(),
         record: Vec::new(),
     };
     run(&System::of(model, &[-0.5, 2.0]), &plan, 1, Diagram::default(), &Unobserved)

@@ -107,9 +107,15 @@ impl Plan {
         id
     }
 
-    /// Adds a variable of texts, with its values.
-    pub fn texts(&mut self, parent: Id, name: &str, dimension: Id, values: impl Iterator<Item = String>) -> Id {
-        let id = self.variable(parent, name, Element::Text, &[dimension]);
+    /// Adds a variable of texts over the given dimensions, with its values.
+    pub fn texts(
+        &mut self,
+        parent: Id,
+        name: &str,
+        dimensions: &[Id],
+        values: impl Iterator<Item = String>,
+    ) -> Id {
+        let id = self.variable(parent, name, Element::Text, dimensions);
         let places: Vec<Place> = values.map(|text| self.heaps.lay(Lying::Text(text.into_bytes()))).collect();
         if let Kind::Dataset { texts, .. } = &mut self.objects[id].kind {
             *texts = places;
