@@ -5,6 +5,7 @@ mod attractors;
 mod basins;
 mod check;
 mod emit;
+mod exact;
 mod explore;
 mod export;
 mod failure;
@@ -50,6 +51,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Simulate(typed)) => simulate::trajectory(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
+        Some(Command::Exact(typed)) => exact::compare(&typed),
         Some(Command::View(typed)) => view::show(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Export(typed)) => export::write(&typed),

@@ -12,6 +12,9 @@
 //!   (3)  Σ T_i = q
 //! ```
 //!
+//! A switch of f that is no event has a copy for each flight, with the number i·(switches) + s: at one value of s, several
+//! flights may pass their surfaces, or slide along them, without regard to each other.
+//!
 //! (3) and the phase φ of the first event, which it determines, exist for a forced field only, whose time τ is measured
 //! in forcing periods. The events fix the phase of an autonomous cycle.
 //!
@@ -185,6 +188,59 @@ impl VectorField for Segments<'_> {
             let by_state = (0..all).map(|c| fx[(row * all + c) * lanes + l] * along[c * lanes + l]);
             let by_parameter = (0..count).map(|c| fp[(row * count + c) * lanes + l] * along[(all + c) * lanes + l]);
             out[row * lanes + l] = by_state.chain(by_parameter).sum();
+        }
+    }
+
+    fn switch_count(&self) -> usize {
+        self.events.len() * self.kinks()
+    }
+
+    fn are_independent(&self, one: usize, other: usize) -> bool {
+        one / self.kinks() != other / self.kinks()
+    }
+
+    fn switch_name(&self, switch: usize) -> String {
+        self.field.switch_name(switch % self.kinks())
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        let size = self.kinks() * at.lanes;
+        let mut all = vec![0.0; self.field.switch_count() * at.lanes];
+        for i in 0..self.events.len() {
+            let flight = self.flight(&at, i);
+            self.field.switches(self.inner(&at, i, &flight), &mut all);
+            out[i * size..(i + 1) * size].copy_from_slice(&all[..size]);
+        }
+    }
+
+    fn linearise_switches(&self, at: Batch, free: &[usize], [h, hx, hp, ht]: [&mut [f64]; 4]) {
+        let (n, lanes, q, all, kinks) = (self.n(), at.lanes, free.len(), self.dim(), self.kinks());
+        let (own_free, columns) = self.own_free(free);
+        let count = self.field.switch_count();
+        let [mut own_h, mut own_hx, mut own_hp, mut in_time] =
+            [1, n, own_free.len(), 1].map(|size| vec![0.0; count * size * lanes]);
+        hx.fill(0.0);
+        hp.fill(0.0);
+        for i in 0..self.events.len() {
+            let flight = self.flight(&at, i);
+            let to = [&mut own_h[..], &mut own_hx, &mut own_hp, &mut in_time];
+            self.field.linearise_switches(self.inner(&at, i, &flight), &own_free, to);
+            let first = i * (n + 1);
+            for (s, l) in (0..kinks * lanes).map(|k| (k / lanes, k % lanes)) {
+                let row = i * kinks + s;
+                let later = if self.forced_inside() { in_time[s * lanes + l] } else { 0.0 };
+                h[row * lanes + l] = own_h[s * lanes + l];
+                ht[row * lanes + l] = later * flight.lasts[l];
+                for b in 0..n {
+                    hx[(row * all + first + b) * lanes + l] = own_hx[(s * n + b) * lanes + l];
+                }
+                hx[(row * all + first + n) * lanes + l] = later * at.times.get(l).copied().unwrap_or(0.0);
+                (0..i).for_each(|j| hx[(row * all + j * (n + 1) + n) * lanes + l] = later);
+                for (c, column) in columns.iter().enumerate() {
+                    hp[(row * q + column) * lanes + l] = own_hp[(s * own_free.len() + c) * lanes + l];
+                }
+                self.of_phase(free).for_each(|column| hp[(row * q + column) * lanes + l] = later);
+            }
         }
     }
 
