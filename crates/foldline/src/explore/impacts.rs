@@ -138,14 +138,14 @@ fn flights(system: &System, parameters: &[f64], start: &[f64], whole: f64, q: u3
     integrator.trajectory(&from, [0.0, 2.2 * whole], &[], &mut |passage| {
         let Passage::Step(step) = passage else { return Verdict::Continue };
         step.start_into(&mut x);
-        if let Some(before) = last.as_ref().filter(|before| before[..n] != x[..n]) {
-            if let Some(event) = event_between(system, parameters, &before[..n], &x[..n], step.start_time()) {
-                events.push(event);
-                let first = all.get(1).map(|own: &Samples| own.start);
-                all.push(Samples { start: step.start_time(), ..Samples::default() });
-                if first.is_some_and(|first| step.start_time() > first + (1.0 + NEAR) * whole) {
-                    return Verdict::Stop;
-                }
+        if let Some(before) = last.as_ref().filter(|before| before[..n] != x[..n])
+            && let Some(event) = event_between(system, parameters, &before[..n], &x[..n], step.start_time())
+        {
+            events.push(event);
+            let first = all.get(1).map(|own: &Samples| own.start);
+            all.push(Samples { start: step.start_time(), ..Samples::default() });
+            if first.is_some_and(|first| step.start_time() > first + (1.0 + NEAR) * whole) {
+                return Verdict::Stop;
             }
         }
         let Some(own) = all.last_mut() else { return Verdict::Stop };

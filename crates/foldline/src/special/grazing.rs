@@ -328,7 +328,7 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
     let at = |t: f64| value(field, parameters, &cycle.state(t), time(t).as_slice(), switch)[0];
     // Where the state jumps, neighbours on both sides are not compared.
     let after_event = after_events(field, parameters, cycle);
-    let jumps = |k: usize| k % SECTIONS == 0 && after_event[k / SECTIONS];
+    let jumps = |k: usize| k.is_multiple_of(SECTIONS) && after_event[k / SECTIONS];
     let before_event = |k: usize| {
         let (j, mut x) = (k / SECTIONS, vec![0.0; n]);
         scheme.value_into(1.0, &cycle.profile[j * block..(j + 1) * block], &mut x);

@@ -323,3 +323,87 @@ impl VectorField for Nothing {
 
     fn directional(&self, _at: Batch, _directions: &[&[f64]], _out: &mut [f64]) {}
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Event, Forcing, Model, ModelSource, Parameter, State};
+
+    /// An oscillator with a wall and a spring whose end moves.
+    fn model() -> Model {
+        Model::compile(ModelSource {
+            parameters: vec![Parameter::new("w", 1.3), Parameter::new("g", 0.4)],
+            forcing: Some(Forcing { is_frequency: true, expression: "w".into() }),
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![
+                Definition::new("x", "v"),
+                Definition::new("v", "-x - 3*max(x - g*sin(w*t), 0) - 0.2*sign(v)"),
+            ],
+            events: vec![Event {
+                name: "wall".into(),
+                when: "x - 1".into(),
+                set: vec![Definition::new("v", "-0.8*v")],
+                ..Event::default()
+            }],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn derivatives_of_the_switches_of_all_flights_are_exact() {
+        let model = model();
+        let segments = Segments::new(&model, vec![0, 0], 1);
+        let (size, count) = (segments.dim(), segments.switch_count());
+        assert_eq!([size, count], [6, 4]);
+        // x, v and T of both flights; w, g and φ; s.
+        let at = [0.3, -0.5, 0.6, -0.2, 0.7, 0.4, 1.3, 0.4, 0.15, 0.35];
+        let values = |all: &[f64]| {
+            let mut h = vec![0.0; count];
+            let parameters = Parameters::Shared(&all[size..size + 3]);
+            let batch = Batch { lanes: 1, states: &all[..size], parameters, times: &all[size + 3..], signs: &[] };
+            segments.switches(batch, &mut h);
+            h
+        };
+        let [mut h, mut hx, mut hp, mut ht] = [1, size, 3, 1].map(|width| vec![0.0; count * width]);
+        let parameters = Parameters::Shared(&at[size..size + 3]);
+        let batch = Batch { lanes: 1, states: &at[..size], parameters, times: &at[size + 3..], signs: &[] };
+        segments.linearise_switches(batch, &[0, 1, 2], [&mut h, &mut hx, &mut hp, &mut ht]);
+        assert_eq!(h, values(&at));
+        for k in 0..at.len() {
+            let moved = |by: f64| {
+                let mut all = at;
+                all[k] += by;
+                values(&all)
+            };
+            let step = 1e-5;
+            let (more, less) = (moved(step), moved(-step));
+            for row in 0..count {
+                let exact = match k {
+                    k if k < size => hx[row * size + k],
+                    k if k < size + 3 => hp[row * 3 + k - size],
+                    _ => ht[row],
+                };
+                let difference = (more[row] - less[row]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-8, "switch {row}, variable {k}: {exact} {difference}");
+            }
+        }
+    }
+
+    /// Slides of different flights do not disturb each other.
+    #[test]
+    fn two_flights_slide_at_once() {
+        let model = model();
+        let segments = Segments::new(&model, vec![0, 0], 1);
+        let states = [0.05, 0.0, 0.6, -0.02, 0.0, 0.4];
+        let names: Vec<String> = (0..4).map(|switch| segments.switch_name(switch)).collect();
+        let stick = names.iter().position(|name| name == "v").unwrap();
+        assert!(segments.are_independent(stick, stick + 2) && !segments.are_independent(0, 1));
+        let mut signs = [-1.0; 4];
+        (signs[stick], signs[stick + 2]) = (0.0, 0.0);
+        let mut f = vec![0.0; 6];
+        let parameters = Parameters::Shared(&[1.3, 0.4, 0.1]);
+        segments.evaluate(Batch { lanes: 1, states: &states, parameters, times: &[0.2], signs: &signs }, &mut f);
+        assert!([1, 4].iter().all(|row| f[*row].abs() < 1e-14), "{f:?}");
+    }
+}
