@@ -14,7 +14,7 @@ const DOUBLES: [f64; 2] = [1.044_836_141_461_997_6, 1.219_191_719_151_008_6];
 /// At w = 1.6: least displacement, and one of a pair of multipliers.
 const LEAST: f64 = -1.667_953_331_605_275_6;
 const MULTIPLIER: [f64; 2] = [-0.408_121_296_589_251, 0.515_349_810_837_267];
-/// The same wall with Coulomb friction 0.2 instead of the spring, in closed form likewise: w and the least displacement. The
+/// A wall as above, with Coulomb friction 0.2 instead of the spring, in closed form likewise: w and the least displacement. The
 /// mass reverses once per period; sticks once more; reverses and sticks; reverses three times.
 const FRICTION: [[f64; 2]; 4] = [
     [0.9, -1.056_640_433_474_245_9],

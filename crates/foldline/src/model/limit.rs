@@ -565,7 +565,7 @@ mod tests {
         assert_eq!([[1.5, 0.0], [-1.5, 0.0]].map(|x| rate(&small, &x)), [1.5, 0.0]);
     }
 
-    /// What is no law in the limit is refused.
+    /// Expressions that are no law in the limit are refused.
     #[test]
     fn what_has_no_limit_is_refused() {
         for equation in [
