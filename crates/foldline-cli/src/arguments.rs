@@ -60,6 +60,9 @@ pub enum Command {
     /// Recompute the solutions of a run by an independent method and compare
     #[command(after_help = VERIFY_CODES)]
     Verify(Verify),
+    /// Repeat the run of a smoothed law with the exact one, and list what the smoothing changes
+    #[command(after_help = EXIT_CODES)]
+    Exact(Exact),
     /// Show a run in the browser, also while it is computed
     View(View),
     /// Draw the bifurcation diagram of a run
@@ -491,6 +494,25 @@ pub struct Verify {
     /// Number of worst comparisons to list
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub worst: usize,
+    /// Format of the table
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct Exact {
+    /// Folder of the run of a model with `smoothing`
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Run of the same study at another sharpness [default: one at twice the sharpness, in DIR-sharper]
+    #[arg(long, value_name = "DIR")]
+    pub beside: Option<PathBuf>,
+    /// Folder for the run of the exact law [default: DIR-exact]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Number of branches followed in parallel [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
     /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,

@@ -6,6 +6,7 @@ mod basins;
 mod basins_along;
 mod check;
 mod emit;
+mod exact;
 mod explore;
 mod export;
 mod failure;
@@ -52,6 +53,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Simulate(typed)) => simulate::trajectory(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
+        Some(Command::Exact(typed)) => exact::compare(&typed),
         Some(Command::View(typed)) => view::show(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Export(typed)) => export::write(&typed),

@@ -14,8 +14,8 @@ use foldline::explore::Plan;
 use foldline::explore::cells::{Asked, carry_out};
 use foldline_plot::Picture;
 use foldline_store::order::ordered;
+use foldline_store::run_file::{Recorder, forget_stop, is_asked_to_stop, path_in};
 use foldline_store::short::finished;
-use foldline_store::run_file::{Recorder, forget_stop, is_asked_to_stop};
 use foldline_store::study_file::{Study, read_study};
 use std::io::{Write, stderr, stdout};
 use std::path::{Path, PathBuf};
@@ -110,10 +110,29 @@ pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result<Outcome, Failure> {
-    let Way { jobs, limit, folder, .. } = *way;
+/// Runs a study in a folder, or resumes it if its run is there already; prints what was not reached, but no table.
+pub fn completed(study: &Study, folder: &Path, jobs: usize) -> Result<(Diagram, Outcome), Failure> {
+    let (recorder, earlier) = match path_in(folder).exists() {
+        true => Recorder::resume(folder, study)?,
+        false => (Recorder::create(folder, study)?, Diagram::default()),
+    };
+    let way = Way { jobs, resume: true, limit: None, units: &[], folder };
+    let (diagram, stopped) = carried_through(study, recorder, earlier, &way, &Clock::new(None))?;
+    let whole = tell_short(&diagram, &study.plan, &study.model)?;
+    report(format_args!("run: {}", folder.display()))?;
+    Ok((diagram, if whole && !stopped { Outcome::Done } else { Outcome::Short }))
+}
+
+/// Carries a study out and records it. Returns the diagram, and true if it was stopped.
+fn carried_through(
+    study: &Study,
+    recorder: Recorder,
+    earlier: Diagram,
+    way: &Way,
+    clock: &Clock,
+) -> Result<(Diagram, bool), Failure> {
+    let Way { jobs, folder, .. } = *way;
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
-    let clock = Clock::new(limit);
     forget_stop(folder);
     let mut system = explore::System::of_plan(&study.model, &study.plan);
     if let (false, Some(scales)) = (earlier.branches.is_empty(), watch.recorder.scales()) {
@@ -121,7 +140,7 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     }
     let diagram = std::thread::scope(|scope| {
         scope.spawn(|| clock.run(&watch, folder));
-        let _done = Done(&clock);
+        let _done = Done(clock);
         let mut diagram = explore::run(&system, &study.plan, jobs, earlier, &watch);
         let finished = |diagram: Diagram, plan: &Plan| finished(diagram, plan, &study.model);
         let asked = Asked { model: &study.model, plan: &study.plan, finished: &finished };
@@ -139,7 +158,13 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
         watch.recorder.complete()?
     }
 
-    let diagram = ordered(diagram, &study.plan);
+    Ok((ordered(diagram, &study.plan), stopped))
+}
+
+fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result<Outcome, Failure> {
+    let Way { limit, folder, .. } = *way;
+    let clock = Clock::new(limit);
+    let (diagram, stopped) = carried_through(study, recorder, earlier, way, &clock)?;
     match conversion(&study.model, way.units)? {
         Some(conversion) => print_special(&conversion.diagram(diagram.clone()), conversion.model())?,
         None => print_special(&diagram, &study.model)?,

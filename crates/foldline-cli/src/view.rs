@@ -93,6 +93,7 @@ fn drafted(
         text,
         model_file: model_file.display().to_string(),
         model_text,
+        parameters: model.defaults(),
         model,
         plan: Plan::empty(1e-6, 4),
         store: Store::All,

@@ -184,6 +184,11 @@ pub trait VectorField: Send + Sync {
         None
     }
 
+    /// True if no component of f depends on the signs of both switches: an orbit may slide along both surfaces at once.
+    fn are_independent(&self, _one: usize, _other: usize) -> bool {
+        false
+    }
+
     /// Name of a switch, for messages.
     fn switch_name(&self, switch: usize) -> String {
         format!("switch {}", switch + 1)

@@ -23,6 +23,7 @@
 //! | is it right? | [`verify`] |
 //! | how does it depend on every parameter? | [`sensitivity`] |
 //! | what are the results in other units? | [`converted`] |
+//! | what does a smoothed law of contact change? | [`smoothing`] |
 
 pub mod attractors;
 pub mod continuation;
@@ -36,6 +37,7 @@ pub mod model;
 pub mod problem;
 pub mod sensitivity;
 pub mod simulation;
+pub mod smoothing;
 pub mod special;
 pub mod stability;
 pub mod susceptibility;

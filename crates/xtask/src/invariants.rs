@@ -33,6 +33,7 @@ const MODULES: &[(&str, &[&str])] = &[
     ("problem", &["contract", "diagram", "linalg", "special", "stability"]),
     ("sensitivity", &["attractors", "continuation", "contract", "diagram", "explore", "model", "problem", "special"]),
     ("simulation", &["contract", "diagram", "linalg"]),
+    ("smoothing", &["diagram"]),
     ("special", &["contract", "diagram", "linalg", "model", "problem", "stability"]),
     ("stability", &["linalg"]),
     ("susceptibility", &["contract", "diagram", "special"]),

@@ -16,14 +16,16 @@ mod units;
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, diagnose, read_text, unreadable};
-use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Parameter, unsupported};
+use foldline::model::{
+    Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Parameter, Smoothing, unsupported,
+};
 use foldline_shaft::Machine;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 32] = [
+const ROOT_KEYS: [&str; 33] = [
     "name",
     "description",
     "source",
@@ -46,6 +48,7 @@ const ROOT_KEYS: [&str; 32] = [
     "totals",
     "outputs",
     "whirl",
+    "smoothing",
     "rotor",
     "material",
     "shaft",
@@ -225,7 +228,33 @@ impl Reader<'_> {
             source.outputs.push(output);
         }
         source.whirl = root.get("whirl").and_then(|value| self.whirl(value));
+        source.smoothing = root.get("smoothing").and_then(|value| self.smoothing(value));
         source
+    }
+
+    /// Reads the parameter that makes a smoothed law sharp: its name, or a table with the name and the limit.
+    fn smoothing(&mut self, value: &Value) -> Option<Smoothing> {
+        self.places.insert((Item::Smoothing, Field::Name), value.span());
+        let Some(table) = value.get_ref().as_table() else {
+            return Some(Smoothing { parameter: self.walk.string(value, "`smoothing`")?, to_zero: false });
+        };
+        self.walk.only(table, &["parameter", "limit"], "`smoothing`");
+        let parameter = table.get("parameter").and_then(|own| self.walk.string(own, "`parameter` of `smoothing`"));
+        let limit = match table.get("limit").map(Value::get_ref) {
+            None => Some(false),
+            Some(DeValue::Float(own)) if matches!(own.as_str(), "inf" | "+inf") => Some(false),
+            Some(DeValue::Float(own)) if own.as_str().parse() == Ok(0.0) => Some(true),
+            Some(DeValue::Integer(own)) if own.as_str() == "0" => Some(true),
+            Some(_) => None,
+        };
+        let (Some(parameter), Some(to_zero)) = (parameter, limit) else {
+            let message = "`smoothing` does not name a parameter and a limit";
+            let hint =
+                "write `smoothing = \"K\"`, or `smoothing = { parameter = \"eps\", limit = 0 }`; the limit is 0 or inf";
+            self.walk.report(value.span(), message, hint);
+            return None;
+        };
+        Some(Smoothing { parameter, to_zero })
     }
 
     /// Reports mistakes in the table of a map.

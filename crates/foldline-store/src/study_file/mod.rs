@@ -20,9 +20,11 @@ mod near;
 mod profiles;
 mod responses;
 mod seeds;
+mod sharpened;
 
 pub use append::{Action, Appended, Place, Refusal, append};
 pub use grown::{Added, added};
+pub use sharpened::Unsharpened;
 
 use crate::diagnostic::Diagnostic;
 use crate::finite::{check_explorations, check_seeds};
@@ -33,7 +35,7 @@ use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
 use foldline::contract::VectorField;
 use foldline::explore::Plan;
-use foldline::model::{Model, Spread, conserved, in_words};
+use foldline::model::{Contact, Model, Spread, conserved, in_words};
 use foldline::special::quantity::Quantity;
 use items::Items;
 use std::path::{Path, PathBuf};
@@ -52,6 +54,8 @@ pub struct Study {
     pub model_text: String,
     /// Model, with the parameter values of the model file.
     pub model: Model,
+    /// Values of all parameters, unless an item of the study states others.
+    pub parameters: Vec<f64>,
     /// Computations requested.
     pub plan: Plan,
     /// Profiles kept in the run file.
@@ -86,6 +90,7 @@ const ROOT_KEYS: [&str; 21] = [
     "max-time",
     "store",
     "record",
+    "contact",
     "parameters",
     "uncertainty",
     "seed",
@@ -180,6 +185,15 @@ impl Study {
         let text = with_settings(&self.text, &settings);
         parse_study(&text, &self.file, &self.model_text, &self.model_file)
     }
+
+    /// Returns the study of the exact law of a smoothed one. This becomes part of its text.
+    ///
+    /// # Errors
+    /// A message if the model names no parameter that smooths its law, or if the limit is not known.
+    pub fn of_exact_law(&self) -> Result<Study, Vec<Diagnostic>> {
+        let text = with_settings(&self.text, &[("contact", "\"limit\"".to_string())]);
+        parse_study(&text, &self.file, &self.model_text, &self.model_file)
+    }
 }
 
 /// Returns a study text with the settings `(key, value)`. Existing values are replaced; new ones are added at the top.
@@ -222,6 +236,7 @@ fn parse(
     walk.only(&root, &ROOT_KEYS, "the study");
     let Some((model_file, model_text, model)) = load(&mut walk, &root) else { return Err(walk.found) };
 
+    let model = root.get("contact").and_then(|value| with_contact(&mut walk, value, &model)).unwrap_or(model);
     let tolerance = tolerance(&mut walk, &root);
     let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
     let store = root.get("store").map_or(Store::All, |value| store(&mut walk, value));
@@ -291,11 +306,30 @@ fn parse(
         model_file,
         model_text,
         model,
+        parameters: defaults,
         plan,
         store,
         spreads,
         uncertainty,
     })
+}
+
+/// The model with the treatment of contact that a study asks for.
+fn with_contact(walk: &mut Walk, value: &Value, model: &Model) -> Option<Model> {
+    let text = walk.string(value, "`contact`")?;
+    let contact = match text.as_str() {
+        "exact" => Contact::Exact,
+        "smoothed over" => Contact::SmoothedOver,
+        "limit" => Contact::Limit,
+        _ => {
+            let hint =
+                "write \"exact\" (the default), \"smoothed over\", or \"limit\" for the exact law of a smoothed one";
+            walk.report(value.span(), format!("`contact` cannot be `{text}`"), hint);
+            return None;
+        }
+    };
+    let found = model.with_contact(contact);
+    found.map_err(|[message, hint]| walk.report(value.span(), message, hint)).ok()
 }
 
 /// Reports what is not supported with two forcing frequencies.
@@ -335,12 +369,10 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
 
 /// Reports requests that are not supported for a model with events.
 fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
-    let events = model.event_count();
-    if events == 0 {
+    if model.event_count() == 0 {
         return;
     }
     designs::refuse(walk, root, "models with events");
-    let kinks = model.switch_count() - events;
     for (span, _) in walk.tables(root, "explore") {
         let hint = "start a `[[branch]]` at a `[[seed]]`, and switch at its period doublings";
         walk.report(span, "models with events are not explored", hint);
@@ -355,15 +387,7 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
             walk.report(value.span(), message, "fold, period-doubling, torus, hopf or impact-grazing");
         }
     }
-    for (span, table) in walk.tables(root, "branch") {
-        if kinks > 0 {
-            let message = format!(
-                "the model has events and switching points ({} = 0): its branches are not followed",
-                model.switch_name(0)
-            );
-            let hint = "remove the events or the switching points; simulations, sweeps and surveys have both";
-            walk.report(span, message, hint);
-        }
+    for (_, table) in walk.tables(root, "branch") {
         for key in ["hold", "peaks"] {
             if let Some(value) = table.get(key) {
                 let message = format!("`{key}` is not supported for models with events");

@@ -635,6 +635,9 @@ impl Growth<'_> {
                 Some(_) => {}
             }
         }
+        if on_surfaces && branch.family == Family::Cycle {
+            marks.extend(impact::on_curves(system.field, false));
+        }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none());
         let home = home.map(|point| Point { unstable: counted_at(point), ..point.clone() });
         let limits = Limits {
@@ -739,42 +742,46 @@ impl Growth<'_> {
             if going { Verdict::Continue } else { Verdict::Stop }
         };
         let mut ending = follow(&mut walk, start, previous, emitted, &mut sink);
+        // Beyond a corner the branch goes on with the same problem, and beyond an impact grazing with another sequence of events.
+        let mut other: Option<Box<dyn ZeroProblem + '_>> = None;
         for _ in 0..CORNERS {
-            if !matches!(ending, Ending::Joined { at: Kind::Grazing, .. }) {
+            let Ending::Joined { at: at @ (Kind::Grazing | Kind::ImpactGrazing), .. } = ending else { break };
+            if self.observer.stopping() {
                 break;
             }
             let there = latest.borrow().clone();
-            let left = revived(walk.problem, self.settings, &there, direction).ok();
-            let found =
-                left.and_then(|left| corner::beyond(walk.problem, self.settings, system.field, &left, direction));
-            let Some((special, mut right)) = found else { break };
-            let position = there.position + if side == 1 { 1 } else { -1 };
-            (right.point.position, walk.homecoming) = (position, Homecoming::default());
-            let stops = sink(Item::Special(special)) == Verdict::Stop
-                || sink(Item::Point(right.point.clone())) == Verdict::Stop;
-            ending = match stops {
-                true => Ending::Stopped,
-                false => follow(&mut walk, right, None, position.unsigned_abs() as usize, &mut sink),
+            let mut next = None;
+            if at == Kind::ImpactGrazing {
+                let Some((problem, station)) = beyond.take() else { break };
+                (other, next) = (Some(problem), Some(station));
+            }
+            let holds = walk.holds && other.is_none();
+            let problem = match &mut other {
+                Some(problem) => &mut **problem,
+                None => &mut *walk.problem,
             };
+            let mut walk =
+                Follow { problem, holds, homecoming: Homecoming::default(), inspected: walk.inspected, ..walk };
+            let mut stops = false;
+            let mut right = match next {
+                Some(next) => next,
+                None => {
+                    let left = revived(walk.problem, self.settings, &there, direction).ok();
+                    let found = left
+                        .and_then(|left| corner::beyond(walk.problem, self.settings, system.field, &left, direction));
+                    let Some((special, right)) = found else { break };
+                    stops = sink(Item::Special(special)) == Verdict::Stop;
+                    right
+                }
+            };
+            right.point.position = there.position + if side == 1 { 1 } else { -1 };
+            let emitted = right.point.position.unsigned_abs() as usize;
+            stops = stops || sink(Item::Point(right.point.clone())) == Verdict::Stop;
+            ending = if stops { Ending::Stopped } else { follow(&mut walk, right, None, emitted, &mut sink) };
         }
         if let Ending::Joined { at: Kind::Grazing, parameter } = ending {
             ending =
                 Ending::StepTooSmall(format!("no direction was found in which the branch continues at {parameter}"));
-        }
-        // Beyond an impact grazing the branch goes on with another sequence of events.
-        for _ in 0..CORNERS {
-            if !matches!(ending, Ending::Joined { at: Kind::ImpactGrazing, .. }) || self.observer.stopping() {
-                break;
-            }
-            let there = latest.borrow().clone();
-            let Some((mut problem, mut next)) = beyond.take() else { break };
-            let position = there.position + if side == 1 { 1 } else { -1 };
-            next.point.position = position;
-            let mut walk = Follow { holds: false, ..walk.on(&mut *problem) };
-            ending = match sink(Item::Point(next.point.clone())) == Verdict::Stop {
-                true => Ending::Stopped,
-                false => follow(&mut walk, next, None, position.unsigned_abs() as usize, &mut sink),
-            };
         }
         // A connecting orbit that has come to need longer ends goes on with them.
         for _ in 0..LENGTHENINGS {

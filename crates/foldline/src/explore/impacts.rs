@@ -26,6 +26,8 @@ const INTERVALS: usize = 12;
 const DEGREE: usize = 4;
 /// Distance of the last event from a period after the first, relative to it.
 const NEAR: f64 = 0.05;
+/// Speed, relative to that of an oscillation of the same size, of an event that hardly has any.
+const SLOW: f64 = 1e-4;
 /// Difference of the durations of flights, relative to the period, up to which turns are equal.
 const EQUAL: f64 = 1e-5;
 
@@ -136,10 +138,9 @@ fn flights(system: &System, parameters: &[f64], start: &[f64], whole: f64, q: u3
     integrator.trajectory(&from, [0.0, 2.2 * whole], &[], &mut |passage| {
         let Passage::Step(step) = passage else { return Verdict::Continue };
         step.start_into(&mut x);
-        if let Some(before) = last.as_ref().filter(|before| before[..n] != x[..n]) {
-            let Some(event) = event_between(system, parameters, &before[..n], &x[..n], step.start_time()) else {
-                return Verdict::Stop;
-            };
+        if let Some(before) = last.as_ref().filter(|before| before[..n] != x[..n])
+            && let Some(event) = event_between(system, parameters, &before[..n], &x[..n], step.start_time())
+        {
             events.push(event);
             let first = all.get(1).map(|own: &Samples| own.start);
             all.push(Samples { start: step.start_time(), ..Samples::default() });
@@ -185,15 +186,20 @@ fn flights(system: &System, parameters: &[f64], start: &[f64], whole: f64, q: u3
     Ok(Some(Flights { phase, events: events[1..nearest].to_vec(), mesh: mesh.clone(), flights }))
 }
 
-/// The event that leads from one state to the other.
+/// The event that leads from one state to the other; `None` if the state was moved onto the surface along which it slides.
 fn event_between(system: &System, parameters: &[f64], before: &[f64], reached: &[f64], time: f64) -> Option<usize> {
+    /// Distance from the state after an event, relative to the change: that of two dense outputs.
+    const REACHED: f64 = 0.1;
     let times = if system.field.forced() { vec![time] } else { Vec::new() };
     let h = surfaces(system.field, parameters, before, &times);
     let off = |event: usize| {
         let own = after(system.field, parameters, event, before, &times);
         own.iter().zip(reached).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };
+    let moved = before.iter().zip(reached).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let kinks = system.field.switch_count() > system.field.event_count();
     (0..h.len())
+        .filter(|event| !kinks || off(*event) < REACHED * moved)
         .min_by(|a, b| (off(*a), h[*a].abs()).partial_cmp(&(off(*b), h[*b].abs())).unwrap_or(std::cmp::Ordering::Equal))
 }
 
@@ -222,8 +228,6 @@ fn one_turn(flights: Flights, q: u32) -> (Flights, u32) {
 
 /// True if an event of a cycle has hardly any speed.
 pub(super) fn grazes(field: &dyn VectorField, at: &Point) -> bool {
-    /// Speed, relative to that of an oscillation of the same size.
-    const SLOW: f64 = 1e-4;
     let Solution::Cycle(cycle) = &at.solution else { return false };
     if field.event_count() == 0 {
         return false;
@@ -239,6 +243,9 @@ fn usual(cycle: &Cycle, size: f64) -> f64 {
     size * std::f64::consts::TAU / whole
 }
 
+/// Events, and the cycle with a mesh node at each of them.
+type Sequence = (Vec<Impact>, Cycle);
+
 /// A problem with another sequence of events, and a point of it.
 pub(super) type Beyond<'a> = (Box<dyn ZeroProblem + 'a>, Station);
 
@@ -250,8 +257,6 @@ pub(super) fn beyond<'a>(
     at: &Point,
     side: f64,
 ) -> Option<Beyond<'a>> {
-    /// Distances from the grazing, in scaled variables.
-    const DISTANCES: [f64; 4] = [2e-3, 2e-4, 2e-5, 1e-2];
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let (field, parameters) = (system.field, &at.parameters);
     let mut all = impacts(field, parameters, cycle);
@@ -261,17 +266,16 @@ pub(super) fn beyond<'a>(
     let usual = usual(cycle, touch.size);
     let vanishes = slowest.filter(|k| speeds[*k] / usual < touch.value.abs() / touch.size);
     let own = setting(system, free, parameters);
-    let (mut problem, u): (Box<dyn ZeroProblem + 'a>, Vec<f64>) = match vanishes {
+    let sequences: Vec<Sequence> = match vanishes {
         Some(slowest) => {
-            all.remove(slowest);
-            match Flights::between(all, cycle) {
-                Some(flights) => of_flights(own, cycle.degree, cycle.forcing_periods, &flights, parameters),
-                None => {
-                    let mut problem = CycleProblem::like(own, cycle);
-                    let u = problem.unknowns_of(at);
-                    (Box::new(problem), u)
-                }
-            }
+            // A symmetry lets several events lose their speed at once.
+            let together: Vec<usize> = (0..all.len()).filter(|k| speeds[*k] < SLOW * usual).collect();
+            let without = |gone: &[usize]| {
+                let rest = all.iter().enumerate().filter(|(k, _)| !gone.contains(k)).map(|(_, own)| own.clone());
+                (rest.collect::<Vec<Impact>>(), cycle.clone())
+            };
+            let several = (together.len() > 1).then(|| without(&together));
+            several.into_iter().chain([without(&[slowest])]).collect()
         }
         None => {
             let (cut, interval) = with_node(cycle, touch.time);
@@ -280,29 +284,53 @@ pub(super) fn beyond<'a>(
             all.iter_mut().filter(|own| own.interval >= interval).for_each(|own| own.interval += 1);
             all.push(Impact { interval, time: touch.time, event: touch.event, before, after });
             all.sort_by_key(|own| own.interval);
-            let flights = Flights::between(all, &cut)?;
-            of_flights(own, cycle.degree, cycle.forcing_periods, &flights, parameters)
+            vec![(all, cut)]
         }
     };
-    problem.anchor(&u);
+    sequences.into_iter().find_map(|(all, cycle)| {
+        let (mut problem, u): (Box<dyn ZeroProblem + 'a>, Vec<f64>) = match Flights::between(all, &cycle) {
+            Some(flights) => of_flights(own.clone(), cycle.degree, cycle.forcing_periods, &flights, parameters),
+            None => {
+                let mut problem = CycleProblem::like(own.clone(), &cycle);
+                let u = problem.unknowns_of(at);
+                (Box::new(problem), u)
+            }
+        };
+        let found = beside(&mut *problem, settings, field, &u, side, vanishes.is_none())?;
+        Some((problem, found))
+    })
+}
+
+/// A solution beside the point `u` of a grazing that is a motion, with its tangent away from it.
+fn beside(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    field: &dyn VectorField,
+    u: &[f64],
+    side: f64,
+    gained: bool,
+) -> Option<Station> {
+    /// Distances from the grazing, in scaled variables.
+    const DISTANCES: [f64; 4] = [2e-3, 2e-4, 2e-5, 1e-2];
+    problem.anchor(u);
     let mesh = problem.mesh();
-    let along = direction(&mut *problem, &u).ok()?;
+    let along = direction(problem, u).ok()?;
     for distance in DISTANCES {
         for sign in [1.0, -1.0] {
             problem.set_mesh(&mesh);
-            problem.anchor(&u);
+            problem.anchor(u);
             let row: Vec<f64> = along.iter().map(|t| sign * t).collect();
             let guess = u.iter().zip(&row).map(|(u, t)| u + distance * t).collect();
-            let plane = Plane { row, base: u.clone(), distance };
-            let found = settle(&mut *problem, settings, plane, guess, side, &mut Cost::default());
+            let plane = Plane { row, base: u.to_vec(), distance };
+            let found = settle(problem, settings, plane, guess, side, &mut Cost::default());
             if let Ok(mut found) = found
                 && inadmissible(field, &found.point).is_none()
             {
-                if approaches(&*problem, field, &found, vanishes.is_none()) {
+                if approaches(problem, field, &found, gained) {
                     found.tangent.iter_mut().for_each(|t| *t = -*t);
                     found.point.tangent.iter_mut().for_each(|t| *t = -*t);
                 }
-                return Some((problem, found));
+                return Some(found);
             }
         }
     }

@@ -17,7 +17,7 @@ use crate::contract::{Batch, VectorField};
 use std::sync::Arc;
 
 /// Conditions as graph nodes.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Conditions {
     /// Expressions that vanish; the ends are the directions 0 and 1.
     pub ends: Vec<Id>,

@@ -372,6 +372,7 @@ pub(super) fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::Integral(i) => source.boundary.as_ref().map_or("", |own| &own.integrals[i].name),
         Item::Event(i) => &source.events[i].name,
         Item::Whirl | Item::Forcing | Item::Solve => "",
+        Item::Smoothing => source.smoothing.as_ref().map_or("", |own| &own.parameter),
     }
 }
 

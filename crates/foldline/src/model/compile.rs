@@ -20,7 +20,7 @@ use std::collections::HashMap;
 const MOST_COUPLED: usize = 100;
 
 /// Expressions of a model as graph nodes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Compiled {
     pub graph: Graph,
     /// f, one node per state; per forcing period if the model is forced.

@@ -44,6 +44,8 @@ pub enum Item {
     Solve,
     /// An event.
     Event(usize),
+    /// The parameter that makes a smoothed law sharp.
+    Smoothing,
 }
 
 /// Field of an item.
@@ -114,6 +116,7 @@ impl fmt::Display for ModelError {
             Item::Integral(_) => "the integral condition",
             Item::Solve => "solve",
             Item::Event(_) => "the event",
+            Item::Smoothing => "the parameter of `smoothing`",
         };
         write!(f, "{part}")?;
         if !self.name.is_empty() {

@@ -14,12 +14,12 @@ use super::nearest::suggest;
 use super::parser::Expression;
 use super::source::{ModelSource, State};
 use super::tape::Tape;
-use super::{Branch, Model, Tapes, cached, column, rows};
+use super::{Branch, Model, Tapes, cached, column, rows, sliding};
 use crate::contract::Batch;
 use std::sync::Arc;
 
 /// An event as graph nodes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Lowered {
     /// The switch.
     pub when: Id,
@@ -159,16 +159,23 @@ impl Model {
 
     /// See [`crate::contract::VectorField::slopes_in_time`].
     pub(super) fn in_time(&self, at: Batch, out: &mut [f64]) {
-        let branch = if at.signs.is_empty() { Branch::Actual } else { Branch::Given };
-        let tape = cached(&self.inner.event_tapes.in_time, branch, || {
-            let (mut graph, field) = self.branch(branch, 0);
-            let slopes = column(&mut graph, &field, Leaf::Time);
-            Tape::new(&graph, &[&slopes])
-        });
-        match branch {
-            Branch::Actual => tape.run(at, &[], &mut [out]),
-            _ => tape.run(at, &[at.signs], &mut [out]),
+        let tape = |branch: Branch| {
+            cached(&self.inner.event_tapes.in_time, branch, || {
+                let (mut graph, field) = self.branch(branch, 0);
+                let slopes = column(&mut graph, &field, Leaf::Time);
+                Tape::new(&graph, &[&slopes])
+            })
+        };
+        if at.signs.is_empty() {
+            return tape(Branch::Actual).run(at, &[], &mut [out]);
         }
+        if sliding::occurs(&at) {
+            return sliding::each(at, &[], &mut [out], |at, _, along, to| match along {
+                None => self.in_time(at, to[0]),
+                Some(switch) => tape(Branch::Sliding(switch)).run(at, &[at.signs], to),
+            });
+        }
+        tape(Branch::Given).run(at, &[at.signs], &mut [out]);
     }
 
     /// The first event that does not allow a state, by index.

@@ -29,6 +29,7 @@ mod iterated;
 pub mod kernels;
 mod laws;
 mod lexer;
+mod limit;
 mod lower;
 mod mass;
 mod nearest;
@@ -56,8 +57,8 @@ pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
 pub use source::{
-    Boundary, Constant, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter, Passing,
-    Repeat, Spread, State, Total,
+    Boundary, Constant, Contact, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter,
+    Passing, Repeat, Smoothing, Spread, State, Total,
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
@@ -123,6 +124,8 @@ pub struct About {
     pub variable: String,
     /// Remarks on doubtful units.
     pub remarks: Vec<String>,
+    /// Parameter whose limit turns a smoothed law into the exact one, and true if that limit is 0 instead of infinity.
+    pub sharpness: Option<(usize, bool)>,
 }
 
 /// Tapes that are built at their first use.
@@ -194,16 +197,15 @@ impl Model {
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
         let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
-        let field = Tape::new(&compiled.graph, &[&compiled.field]);
-        let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
-        let events: Vec<graph::Id> = compiled.events.iter().map(|event| event.when).collect();
-        let switches = Switches::new(&compiled.graph, &compiled.field, &events);
-        let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
+        let sharpness = match &source.smoothing {
+            None => None,
+            Some(own) => Some((limit::sharpness(own, &parameters, &compiled)?, own.to_zero)),
+        };
         let variable = source.boundary.as_ref().map_or(check::TIME.to_string(), |own| own.variable.clone());
         let events = source.events.iter().map(|event| event.name.clone()).collect();
         let ModelSource { name, description, source, time, .. } = source;
         let (whirl, remarks) = (compiled.whirl, Vec::new());
-        let outputs_of = output_list;
+        let outputs = output_list;
         let about = About {
             name,
             description,
@@ -211,13 +213,84 @@ impl Model {
             states,
             parameters,
             totals,
-            outputs: outputs_of,
+            outputs,
             whirl,
             events,
             time,
             variable,
             remarks,
+            sharpness,
         };
+        let model = Model::assembled(Arc::new(about), compiled, second, map, Contact::Exact);
+        let wrong = model.wrong_period().or_else(|| iterated::switched(&model)).or_else(|| boundary::switched(&model));
+        match wrong.or_else(|| angles::no_angle(&model, &items)) {
+            Some(error) => Err(vec![error]),
+            None => Ok(model),
+        }
+    }
+
+    /// The model with another treatment of the places at which f or its derivatives jump.
+    ///
+    /// # Errors
+    /// A message and a hint, if the model has no such form.
+    pub fn with_contact(&self, contact: Contact) -> Result<Model, [String; 2]> {
+        let Inner { compiled, second, map, .. } = &*self.inner;
+        let built = |compiled| {
+            let second = second.clone();
+            Model::assembled(self.about.clone(), compiled, second, *map, contact)
+        };
+        let what = match contact {
+            _ if *map => Some("a map"),
+            _ if self.conditions() != [0, 0] => Some("a boundary-value problem"),
+            _ if second.is_some() => Some("a model with two forcing frequencies"),
+            _ => None,
+        };
+        if let Some(what) = what.filter(|_| contact != Contact::Exact) {
+            return Err([format!("`contact` is not supported for {what}"), "remove `contact`".into()]);
+        }
+        match contact {
+            Contact::Exact => Ok(self.clone()),
+            Contact::SmoothedOver if self.event_count() > 0 => Err([
+                "the states of the model jump at events, which cannot be smoothed over".into(),
+                "remove `contact`, or write the contact as a stiff force".into(),
+            ]),
+            Contact::SmoothedOver => Ok(built(compiled.clone())),
+            Contact::Limit => match self.sharpness {
+                None => Err([
+                    "the model does not say which parameter smooths its law".into(),
+                    "add a line such as `smoothing = \"K\"` to the model: the parameter whose growth makes the law sharp"
+                        .into(),
+                ]),
+                Some((parameter, to_zero)) => {
+                    limit::limit(compiled, parameter, to_zero).map(built).map_err(|why| self.no_limit(parameter, why))
+                }
+            },
+        }
+    }
+
+    fn no_limit(&self, parameter: usize, why: &str) -> [String; 2] {
+        let name = &self.parameters[parameter].name;
+        [
+            format!("the limit of the model in `{name}` is not known: {why}"),
+            format!(
+                "write the law with tanh({name}*g), log(1 + exp({name}*g))/{name}, sqrt(g^2 + 1/{name}^2) or atan({name}*g)"
+            ),
+        ]
+    }
+
+    fn assembled(
+        about: Arc<About>,
+        compiled: Compiled,
+        second: Option<(usize, Model)>,
+        map: bool,
+        contact: Contact,
+    ) -> Model {
+        let field = Tape::new(&compiled.graph, &[&compiled.field]);
+        let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
+        let events: Vec<graph::Id> = compiled.events.iter().map(|event| event.when).collect();
+        let switching: &[graph::Id] = if contact == Contact::SmoothedOver { &[] } else { &compiled.field };
+        let switches = Switches::new(&compiled.graph, switching, &events);
+        let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
         let (given_graph, given) = switches.given(0);
         let given = Tape::new(&given_graph, &[&given]);
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
@@ -244,12 +317,7 @@ impl Model {
             period_derivatives: RwLock::default(),
             moving: RwLock::default(),
         };
-        let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
-        let wrong = model.wrong_period().or_else(|| iterated::switched(&model)).or_else(|| boundary::switched(&model));
-        match wrong.or_else(|| angles::no_angle(&model, &items)) {
-            Some(error) => Err(vec![error]),
-            None => Ok(model),
-        }
+        Model { about, inner: Arc::new(inner) }
     }
 
     /// Error if the forcing is not periodic with its stated period.

@@ -201,6 +201,27 @@ pub struct Event {
     pub allowed: Option<String>,
 }
 
+/// Parameter whose limit turns a smoothed law into the exact one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Smoothing {
+    /// Name of the parameter.
+    pub parameter: String,
+    /// True if the limit is 0; otherwise it is infinity.
+    pub to_zero: bool,
+}
+
+/// Treatment of the places at which f or its derivatives jump.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Contact {
+    /// They are located.
+    #[default]
+    Exact,
+    /// They are not: polynomials extend across them.
+    SmoothedOver,
+    /// The exact law of a smoothed one takes its place; see [`ModelSource::smoothing`].
+    Limit,
+}
+
 /// Model as written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelSource {
@@ -235,6 +256,8 @@ pub struct ModelSource {
     pub boundary: Option<Boundary>,
     /// Events at which states jump.
     pub events: Vec<Event>,
+    /// Parameter that makes a smoothed law sharp.
+    pub smoothing: Option<Smoothing>,
     /// True for a map: the equations give the next state instead of the rate.
     pub map: bool,
     /// Entries of the matrix that multiplies the rates; rows without entries are those of the identity.

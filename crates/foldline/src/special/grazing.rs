@@ -21,6 +21,8 @@
 //!
 //! **Source.** dibernardo2008, §2.5 and §7.
 //!
+//! A cycle with events is examined flight by flight, with the values of h at both ends of a flight among its extrema.
+//!
 //! Where the orbit slides along the surface, h is zero; see [`super::sliding::touches`] for what takes the place of the
 //! extremum.
 
@@ -29,6 +31,7 @@ mod pairs;
 use super::sliding;
 use crate::contract::{Batch, Events, Monitor, Parameters, Separate, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::problem::impact::stored::hard;
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours; extrema are then found by
 /// parabolas.
@@ -68,6 +71,8 @@ pub struct Extremum {
     pub value: f64,
     /// True for a maximum.
     pub maximum: bool,
+    /// True at the beginning or the end of a flight between events, where the switch may jump and does not graze zero.
+    pub at_event: bool,
 }
 
 /// The extrema at two points, and the pairs of their indices.
@@ -113,10 +118,16 @@ impl Monitor for Grazing<'_> {
             // The number of excursions alone, with a look in between.
             let values = [left, right].map(|at| self.value(left, at));
             let own = || Separate { values, monitor: Box::new(self.clone()) };
-            let seen = ((values[0] > 0.0) != (values[1] > 0.0) && values.iter().all(|v| v.is_finite())).then(own);
+            // An extremum may leave its flight at an event, which changes their number as well.
+            let changes = (values[0] > 0.0) != (values[1] > 0.0) && values.iter().all(|v| v.is_finite());
+            let seen = (changes && self.field.event_count() == 0).then(own);
             return Some(Events { seen: seen.into_iter().collect(), turns: vec![0.5] });
         };
-        let passes = |pair: &&[usize; 2]| (ends[0][pair[0]].value > 0.0) != (ends[1][pair[1]].value > 0.0);
+        let at_event = |pair: &[usize; 2]| ends[0][pair[0]].at_event || ends[1][pair[1]].at_event;
+        // A surface that is reached at the instant of an event matters where f jumps.
+        let matters = |pair: &[usize; 2]| !at_event(pair) || self.jumps(left, &ends[0][pair[0]]);
+        let passes =
+            |pair: &&[usize; 2]| (ends[0][pair[0]].value > 0.0) != (ends[1][pair[1]].value > 0.0) && matters(pair);
         let single = |pair: &[usize; 2]| Separate {
             values: [ends[0][pair[0]].value, ends[1][pair[1]].value],
             monitor: Box::new(Touch { of: self.clone(), ends: ends.clone(), index: pair[0] }),
@@ -128,7 +139,7 @@ impl Monitor for Grazing<'_> {
         };
         Some(Events {
             seen: matched.iter().filter(passes).map(single).collect(),
-            turns: matched.iter().filter_map(between).collect(),
+            turns: matched.iter().filter(|pair| !at_event(pair)).filter_map(between).collect(),
         })
     }
 
@@ -163,6 +174,14 @@ impl Grazing<'_> {
         }
         let matched = pairs::matched(&a, &b, size.max(other))?;
         Some(([a, b], matched))
+    }
+
+    /// True if f jumps at the surface, next to an extremum.
+    fn jumps(&self, at: &Point, own: &Extremum) -> bool {
+        match &at.solution {
+            Solution::Cycle(cycle) => sliding::jumps_at(self.field, at, cycle, own.time, self.switch),
+            Solution::Equilibrium(_) | Solution::Torus(_) => false,
+        }
     }
 
     /// Change of an extremum per unit of length along the branch.
@@ -218,6 +237,10 @@ impl Monitor for Touch<'_> {
         const TOGETHER: [f64; 2] = [10.0, 1e-8];
         let Some((all, here, own)) = self.here(at) else { return String::new() };
         let Some(across) = self.across() else { return String::new() };
+        if all[own].at_event {
+            let name = self.of.field.switch_name(self.of.switch);
+            return format!("{name} = 0 is reached at the instant of an event");
+        }
         let size = self.size();
         let zero = (TOGETHER[0] * all[own].value.abs()).max(TOGETHER[1] * size);
         let on_side = |side: usize| -> i64 {
@@ -262,7 +285,9 @@ impl Touch<'_> {
 
 /// Excursions above zero during the period.
 fn excursions(extrema: &[Extremum]) -> i64 {
-    extrema.iter().filter(|e| e.value > 0.0).map(|e| if e.maximum { 1 } else { -1 }).sum()
+    let count = extrema.len();
+    let begins = |k: &usize| extrema[*k].value <= 0.0 && extrema[(k + 1) % count].value > 0.0;
+    (0..count).filter(begins).count() as i64
 }
 
 /// One switch at states `[n × lanes]`.
@@ -301,13 +326,30 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
         sliding::pushes(field, parameters, &x, time(places[k]), switch)
     });
     let at = |t: f64| value(field, parameters, &cycle.state(t), time(t).as_slice(), switch)[0];
+    // Where the state jumps, neighbours on both sides are not compared.
+    let after_event = after_events(field, parameters, cycle);
+    let jumps = |k: usize| k.is_multiple_of(SECTIONS) && after_event[k / SECTIONS];
+    let before_event = |k: usize| {
+        let (j, mut x) = (k / SECTIONS, vec![0.0; n]);
+        scheme.value_into(1.0, &cycle.profile[j * block..(j + 1) * block], &mut x);
+        value(field, parameters, &x, time(cycle.mesh[j + 1]).as_slice(), switch)[0]
+    };
     let mut found = if flat.contains(&true) { sliding::touches(field, parameters, cycle, switch) } else { Vec::new() };
     for k in 0..lanes {
         let (before, after) = ((k + lanes - 1) % lanes, (k + 1) % lanes);
         if flat[k] || flat[after] {
             continue;
         }
-        let (low, high) = (values[k] - values[before], values[after] - values[k]);
+        let next = if jumps(after) { before_event(k) } else { values[after] };
+        let ends = |time: f64, value: f64, maximum: bool| Extremum { time, value, maximum, at_event: true };
+        if jumps(k) {
+            found.push(ends(places[k], values[k], values[k] > next));
+            continue;
+        }
+        if jumps(after) {
+            found.push(ends(cycle.mesh[k / SECTIONS + 1], next, next > values[k]));
+        }
+        let (low, high) = (values[k] - values[before], next - values[k]);
         // Of equal neighbours the first counts.
         let maximum = low > 0.0 && high <= 0.0;
         let minimum = low < 0.0 && high >= 0.0;
@@ -316,11 +358,18 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
         }
         let back = if k == 0 { places[before] - 1.0 } else { places[before] };
         let on = if after == 0 { 1.0 } else { places[after] };
-        let (time, value) = refined([back, places[k], on], [values[before], values[k], values[after]], &at);
-        found.push(Extremum { time, value, maximum });
+        let (time, value) = refined([back, places[k], on], [values[before], values[k], next], &at);
+        found.push(Extremum { time, value, maximum, at_event: false });
     }
     found.sort_by(|a, b| a.time.total_cmp(&b.time));
     (pairs::alternating(found, ZERO * size), size)
+}
+
+/// Marks the intervals of a cycle that begin after an event.
+pub(super) fn after_events(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<bool> {
+    let mut marked = vec![false; cycle.intervals()];
+    hard(field, parameters, cycle).iter().for_each(|own| marked[(own.interval + 1) % cycle.intervals()] = true);
+    marked
 }
 
 /// Marks the places of a slide along the surface, which has no extrema: runs of small values at which f on both sides
@@ -368,17 +417,34 @@ fn refined(mut t: [f64; 3], mut v: [f64; 3], at: &dyn Fn(f64) -> f64) -> (f64, f
     found
 }
 
+/// The extremum of a switch that is no event next to zero.
+pub struct Nearest {
+    /// The switch.
+    pub switch: usize,
+    /// Its largest absolute value.
+    pub size: f64,
+    /// The extremum.
+    pub extremum: Extremum,
+}
+
+/// The extremum next to zero of all switches that are no events along a cycle.
+pub fn nearest(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Option<Nearest> {
+    (0..field.switch_count() - field.event_count())
+        .flat_map(|switch| {
+            let (all, size) = extrema(field, parameters, cycle, switch);
+            let inside = all.into_iter().filter(|own| !own.at_event);
+            inside.map(move |extremum| Nearest { switch, size: size.max(f64::MIN_POSITIVE), extremum })
+        })
+        .min_by(|a, b| (a.extremum.value.abs() / a.size).total_cmp(&(b.extremum.value.abs() / b.size)))
+}
+
 /// Description of the change at a grazing, in the order of growing positions.
 pub fn described(field: &dyn VectorField, at: &Point) -> String {
     let Solution::Cycle(cycle) = &at.solution else { return String::new() };
-    let nearest = (0..field.switch_count())
-        .filter_map(|switch| {
-            let (all, size) = extrema(field, &at.parameters, cycle, switch);
-            let own = all.iter().copied().min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))?;
-            Some((own.value.abs() / size.max(f64::MIN_POSITIVE), switch, own, excursions(&all)))
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((_, switch, own, count)) = nearest else { return String::new() };
+    let Some(Nearest { switch, extremum: own, .. }) = nearest(field, &at.parameters, cycle) else {
+        return String::new();
+    };
+    let count = excursions(&extrema(field, &at.parameters, cycle, switch).0);
     // Excursions with the extremum below and above zero.
     let above = count + i64::from(own.value <= 0.0) * if own.maximum { 1 } else { -1 };
     let below = if own.maximum { above - 1 } else { above + 1 };

@@ -188,16 +188,18 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
         let time = cycle.mesh[j] + s * (cycle.mesh[j + 1] - cycle.mesh[j]);
         surfaces(field, parameters, &x, &times_of(cycle, time))
     };
-    // Flights, as ranges of intervals; without events the period and a little more, so that no maximum is at an end.
-    let flights: Vec<[usize; 2]> = match all.len() {
-        0 => vec![[0, count + 1]],
+    // Flights, as ranges of intervals, and the events at their ends; without events the period and a little more, so that no
+    // maximum is at an end.
+    let flights: Vec<([usize; 2], [Option<usize>; 2])> = match all.len() {
+        0 => vec![([0, count + 1], [None; 2])],
         _ => {
             let end = |k: usize| all[k % all.len()].interval + 1 + if k >= all.len() { count } else { 0 };
-            (0..all.len()).map(|k| [end(k), end(k + 1)]).collect()
+            let event = |k: usize| Some(all[k % all.len()].event);
+            (0..all.len()).map(|k| ([end(k), end(k + 1)], [event(k), event(k + 1)])).collect()
         }
     };
     let (mut found, mut size): (Vec<(f64, f64, usize)>, f64) = (Vec::new(), 0.0);
-    for [first, last] in flights {
+    for ([first, last], ends) in flights {
         let places: Vec<f64> = (first * SECTIONS..last * SECTIONS)
             .map(|k| k as f64 / SECTIONS as f64)
             .chain([last as f64 - 1e-12])
@@ -212,7 +214,7 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
             };
             for sign in signs {
                 let own: Vec<f64> = own.iter().map(|h| sign * h).collect();
-                for k in maxima(&own, all.is_empty()) {
+                for k in maxima(&own, ends.map(|end| end == Some(event))) {
                     let course = |place: f64| sign * at(place)[event];
                     let around = [places[k - 1], places[k], places[k + 1]];
                     let (place, value) = refined(around, own[k], &course);
@@ -238,15 +240,16 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
     Highest { value: if most.is_finite() { most } else { -size }, size, time, event }
 }
 
-/// Local maxima of samples that are not at an end: on a flight between events, those between two minima. A stretch at
-/// the beginning that is positive does not count.
-fn maxima(values: &[f64], closed: bool) -> Vec<usize> {
+/// Local maxima of samples that are not at an end. At an end that is `on` the surface, a minimum lies between it and the
+/// maximum. A stretch at the beginning that is positive does not count.
+fn maxima(values: &[f64], on: [bool; 2]) -> Vec<usize> {
     let last = values.len() - 1;
     let below = if values[1] > 0.0 { values.iter().position(|h| *h < 0.0).unwrap_or(last) } else { 0 };
     let inner = |k: usize| values[k] > values[k - 1] && values[k] >= values[k + 1];
     let dips = |k: usize| values[k] <= values[k - 1] && values[k] < values[k + 1];
     let falls: Vec<usize> = (1..last).filter(|k| dips(*k)).collect();
-    let between = |k: usize| closed || falls.iter().any(|dip| *dip < k) && falls.iter().any(|dip| *dip > k);
+    let between =
+        |k: usize| (!on[0] || falls.iter().any(|dip| *dip < k)) && (!on[1] || falls.iter().any(|dip| *dip > k));
     (1..last).filter(|k| *k >= below && inner(*k) && between(*k)).collect()
 }
 

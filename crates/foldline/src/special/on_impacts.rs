@@ -1,10 +1,10 @@
-//! Defining systems of folds, period doublings, torus points and impact grazings of cycles with events.
+//! Defining systems of folds, period doublings, torus points and grazings of both kinds of cycles with events.
 //!
 //! **Idea.** A perturbation of such a cycle is carried through each flight, and through the jump at its end by the
 //! saltation matrix. Where it returns to itself, to its opposite, or turned by an angle, the cyclic system of all flights
 //! is singular. Bordered by approximate null vectors it is regular, and the border component g of its solution is the
 //! number that must vanish. At an impact grazing, g is the maximum of the switch of an event during a flight, which is
-//! regular on cycles without that event.
+//! regular on cycles without that event; at a grazing, the extremum of another switch.
 //!
 //! **Equations.** With A_i = S_i Φ_i the transition and the saltation matrix of flight i = 1 … k, σ the sign of the change
 //! of a switch h:
@@ -13,7 +13,7 @@
 //!   fold              (1)  v_{i+1} = A_i v_i,   A_k v_k = v_1 - T₁ f,   ⟨f, v_1⟩ = 0     T₁ = 0 for a forced field
 //!   period doubling   (2)  v_{i+1} = A_i v_i,   A_k v_k = -v_1
 //!   torus             (3)  v_{i+1} = A_i v_i,   A_k v_k = e^{iθ} v_1                     v complex
-//!   impact grazing    (4)  g = max σ h
+//!   grazing           (4)  g = max σ h
 //! ```
 //!
 //! **Source.** govaerts2000, §3 and §7; leine2004, §7; nordmark1991.
@@ -23,6 +23,7 @@
 //!
 //! **Fails when** a curve of torus points approaches a 1:1 or 1:2 resonance, where it ends with a message.
 
+use super::grazing;
 use super::impact::{Highest, highest};
 use crate::contract::{Condition, ZeroProblem};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
@@ -41,12 +42,12 @@ const BESIDE: f64 = 0.05;
 const SAMPLES: i32 = 8;
 const ROUNDS: usize = 6;
 
-/// A place on a flight: its number, the share of its duration, the event and the sign σ.
+/// A place on a flight: its number, the share of its duration, the switch and the sign σ.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     flight: usize,
     share: f64,
-    event: usize,
+    switch: usize,
     sign: f64,
 }
 
@@ -74,7 +75,8 @@ impl<'a> OnImpacts<'a> {
     /// Defining system of a kind for cycles with the events of `cycle`, but for one without speed if `kind` is impact
     /// grazing; `None` if there are none, or for other kinds.
     pub fn new(kind: Kind, setting: Setting<'a>, cycle: &Cycle) -> Option<OnImpacts<'a>> {
-        let known = matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus | Kind::ImpactGrazing);
+        let known =
+            matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus | Kind::ImpactGrazing | Kind::Grazing);
         let (scales, autonomous) = (setting.scales.to_vec(), cycle.forcing_periods == 0);
         let problem = match kind {
             Kind::ImpactGrazing => ImpactProblem::besides_grazing(setting.clone(), cycle),
@@ -91,7 +93,14 @@ impl<'a> OnImpacts<'a> {
                 let sign = setting.field.event_direction(event);
                 let sign = if sign == 0.0 { problem.side(event) } else { sign };
                 let (flight, share) = problem.place(time);
-                (Some(Place { flight, share, event, sign }), size)
+                let switch = setting.field.switch_count() - setting.field.event_count() + event;
+                (Some(Place { flight, share, switch, sign }), size)
+            }
+            Kind::Grazing => {
+                let grazed = grazing::nearest(setting.field, &setting.parameters, cycle)?;
+                let (flight, share) = problem.place(grazed.extremum.time);
+                let sign = if grazed.extremum.maximum { 1.0 } else { -1.0 };
+                (Some(Place { flight, share, switch: grazed.switch, sign }), grazed.size)
             }
             _ => (None, 1.0),
         };
@@ -195,7 +204,8 @@ impl<'a> OnImpacts<'a> {
 
     /// g of (4), and the share of the flight at which the maximum lies.
     fn touch(&self, u: &[f64], place: Place) -> Option<(f64, f64)> {
-        let at = |share: f64| place.sign * self.problem.surface(u, place.flight, share, place.event);
+        let switches = self.problem.switches_on(u, place.flight);
+        let at = |share: f64| place.sign * switches(share)[place.switch];
         let step = BESIDE / f64::from(SAMPLES);
         let around = (-SAMPLES..=SAMPLES).map(|k| place.share + step * f64::from(k));
         let mut best = around

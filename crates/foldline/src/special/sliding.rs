@@ -18,7 +18,7 @@
 //!
 //! **Fails when** several arrivals that are not images of each other change at one parameter value.
 
-use super::grazing::Extremum;
+use super::grazing::{self, Extremum};
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
 
@@ -134,7 +134,9 @@ fn arrivals(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: 
     let nodes: Vec<Vec<f64>> = (0..intervals).map(at_node).collect();
     let size = nodes.iter().fold(0.0, |most: f64, values| most.max(values[switch].abs()));
     let mut found = Vec::new();
-    for j in (0..intervals).filter(|j| nodes[*j][switch].abs() <= ON_SURFACE * size) {
+    // At an event the orbit does not arrive but jumps there.
+    let after_event = grazing::after_events(field, parameters, cycle);
+    for j in (0..intervals).filter(|j| nodes[*j][switch].abs() <= ON_SURFACE * size && !after_event[*j]) {
         let before = within((j + intervals - 1) % intervals);
         // It slides along the surface already.
         if before[switch].abs() <= ON_SURFACE * size {
@@ -180,7 +182,7 @@ pub(super) fn touches(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle
         let Some(curvature) = curvature(field, parameters, cycle, arrival, switch, side) else { continue };
         if left.is_some_and(|value| value * side > 0.0) && curvature * side > 0.0 {
             let (time, value) = (cycle.mesh[arrival.node], -side * 0.5 * speed * speed / curvature.abs());
-            found.push(Extremum { time, value, maximum: side < 0.0 });
+            found.push(Extremum { time, value, maximum: side < 0.0, at_event: false });
         }
     }
     found

@@ -225,9 +225,10 @@ impl Place<'_> {
         }
         let base = Orbit::away_from_surfaces(self.setting, &self.special.point)?;
         let touch = match self.special.kind {
-            Kind::Grazing | Kind::ImpactGrazing => {
-                Some(Touch::of(self.setting, self.special.kind, &self.special.point).ok_or("it touches no surface")?)
-            }
+            Kind::Grazing | Kind::ImpactGrazing => Some(
+                Touch::of(self.setting, self.special.kind, &self.special.point)
+                    .ok_or("a surface that is reached at the instant of an event is not located again")?,
+            ),
             _ => None,
         };
         let ignored = touch.map(|touch| touch.ignored(&base));

@@ -30,7 +30,7 @@ pub(super) struct Touch {
 }
 
 impl Touch {
-    /// The touch at a special point.
+    /// The touch at a special point; `None` where a surface is reached at the instant of an event.
     pub(super) fn of(setting: &Setting, kind: Kind, point: &Point) -> Option<Touch> {
         let Solution::Cycle(cycle) = &point.solution else { return None };
         match kind {
@@ -70,6 +70,9 @@ impl Touch {
             })
             .min_by(|a, b| a.0.total_cmp(&b.0))?;
         let (_, switch, own) = nearest;
+        if own.at_event {
+            return None;
+        }
         let (others, _) = extrema(field, parameters, cycle, switch);
         let others = others.into_iter().map(|other| other.time).filter(|time| *time != own.time);
         let sign = if own.maximum { 1.0 } else { -1.0 };

@@ -325,11 +325,15 @@ impl<'a> CycleProblem<'a> {
             let found = self.flow(own).intervals(&own[..size], &self.mesh).unwrap_or_default();
             found.iter().for_each(|found| crossed[found.interval] = true);
         }
-        let Some(first) = crossed.iter().position(|own| !own) else { return };
+        // The ends of a boundary-value problem do not meet.
+        let first = if self.is_open() { Some(count - 1) } else { crossed.iter().position(|own| !own) };
+        let Some(first) = first else { return };
         let flow = self.flow(u);
         let mut left: Option<Vec<f64>> = None;
         for j in (first + 1..=first + count).map(|j| j % count) {
-            if j == 0 {
+            if j == 0 && self.is_open() {
+                left = Some(u[..n].to_vec());
+            } else if j == 0 {
                 left.iter_mut().for_each(|x| x.iter_mut().zip(&self.gain).for_each(|(x, gain)| *x -= gain));
             }
             if !crossed[j] {
@@ -363,7 +367,7 @@ impl<'a> CycleProblem<'a> {
 
     /// The orbit with a mesh interval for each part between switchings: mesh and profile, and likewise a tangent
     /// `[unknowns]`.
-    fn cut(&self, u: &[f64], tangent: &[f64]) -> (Mesh, Vec<f64>, Vec<f64>) {
+    pub(in crate::problem) fn cut(&self, u: &[f64], tangent: &[f64]) -> (Mesh, Vec<f64>, Vec<f64>) {
         let size = self.profile_size();
         let switched = self.switched(u);
         if switched.is_empty() {

@@ -29,9 +29,12 @@
 use super::CycleProblem;
 use crate::contract::{Batch, Examination, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Point, Solution, Symmetry};
+use crate::linalg::dot;
 use crate::linalg::ends::Ends;
 use crate::linalg::lane::Lane;
 use crate::linalg::system::{System, either};
+use crate::problem::defect::Defect;
+use crate::problem::piecewise::OneBranch;
 use num_complex::Complex64;
 
 impl CycleProblem<'_> {
@@ -80,6 +83,37 @@ impl CycleProblem<'_> {
     fn weight(&self, at: usize) -> f64 {
         let (m, w) = (self.scheme.degree, self.width);
         self.lengths[at / (w * m) * w + at % w] * self.scheme.weights[at / w % m]
+    }
+
+    /// f at the left ends of all intervals and at the right end of the last, `[N + 1][n]`, in the branch that is in force
+    /// there.
+    pub(in crate::problem) fn rates_at_nodes(&self, u: &[f64]) -> Vec<f64> {
+        let (n, count, block) = (self.n, self.intervals(), self.block());
+        let [_, end] = self.both_ends(u);
+        let parameters = self.setting.at(&u[self.profile_size() + 1..]);
+        let node = |j: usize| if j < count { &u[j * block..j * block + n] } else { &end[..] };
+        let rates = |j: usize, signs: &[f64]| {
+            let (time, mut f) = ([f64::from(self.forcing_periods) * self.mesh[j]], vec![0.0; n]);
+            let times = if self.is_forced() { &time[..] } else { &[] };
+            let parameters = Parameters::Shared(&parameters);
+            self.setting.field.evaluate(Batch { lanes: 1, states: node(j), parameters, times, signs }, &mut f);
+            f
+        };
+        let mut all: Vec<Vec<f64>> = (0..=count).map(|j| rates(j, &[])).collect();
+        let switched = self.switched(u);
+        for found in switched.iter() {
+            all[found.interval] = rates(found.interval, found.signs_at_left());
+        }
+        // A slide that reaches a node goes on there.
+        for found in switched.iter().filter(|found| found.interval + 1 == count || found.slides_at_right()) {
+            all[found.interval + 1] = rates(found.interval + 1, found.signs_at_right());
+        }
+        all.concat()
+    }
+
+    /// True if the orbit of the last factorisation slides along a surface, and so loses a direction.
+    pub(in crate::problem) fn slides(&self) -> bool {
+        self.trace == f64::NEG_INFINITY
     }
 
     /// Writes the residuals of (1) and (2) to `r`, for gathered states.
@@ -247,15 +281,41 @@ impl CycleProblem<'_> {
         let sizes = [scale, scale].concat();
         let found = self.defect(&field, &parameters, &profile, &self.mesh, u[size], &sizes);
         let mut local = vec![0.0f64; count];
-        let half = found.within.len() / 2;
-        for (k, w) in found.within[half..].iter().enumerate() {
-            let component = k / count / (self.scheme.degree + 1);
-            local[k % count] = local[k % count].max((w / scale[component]).abs());
-        }
+        let within = |found: &Defect, local: &mut [f64]| {
+            let (half, count) = (found.within.len() / 2, local.len());
+            for (k, w) in found.within[half..].iter().enumerate() {
+                let component = k / count / (self.scheme.degree + 1);
+                local[k % count] = local[k % count].max((w / scale[component]).abs());
+            }
+        };
+        within(&found, &mut local);
         let second =
             |all: &[f64]| -> Vec<f64> { all.chunks_exact(2 * n).flat_map(|both| &both[n..]).copied().collect() };
-        let misses = second(&found.misses);
-        let rhs = self.defects_of(&second(&found.ends), &second(&found.sources), u.len());
+        let [mut misses, mut ends, mut sources] = [&found.misses, &found.ends, &found.sources].map(|all| second(all));
+        // Where the orbit switches, the parts have the variational equations of their branches.
+        let (block, inner) = (self.block(), self.scheme.degree * n);
+        for own in self.switched(u).iter() {
+            let j = own.interval;
+            let direction = [&y[j * block..j * block + n], &y[size..]].concat();
+            sources[j * inner..(j + 1) * inner].fill(0.0);
+            local[j] = 0.0;
+            let mut missed = vec![0.0; n];
+            for part in &own.parts {
+                let branch = OneBranch { field: self.setting.field, signs: &part.signs };
+                let field = Varied { field: &branch, change: field.change.clone() };
+                let along = part.by.chunks_exact(direction.len()).map(|row| dot(row, &direction)).collect::<Vec<f64>>();
+                let both = part.nodes.chunks_exact(n).zip(along.chunks_exact(n));
+                let nodes: Vec<f64> = both.flat_map(|(x, y)| x.iter().chain(y)).copied().collect();
+                let found = self.defect(&field, &parameters, &nodes, &part.ends, u[size], &sizes);
+                let mut error = [0.0];
+                within(&found, &mut error);
+                local[j] = local[j].max(error[0]);
+                missed.iter_mut().zip(second(&found.misses)).for_each(|(all, own)| *all += own);
+            }
+            ends[j * n..(j + 1) * n].copy_from_slice(&missed);
+            misses[j * n..(j + 1) * n].copy_from_slice(&missed);
+        }
+        let rhs = self.defects_of(&ends, &sources, u.len());
         let mut shift = vec![0.0; u.len()];
         self.solve_defects(&rhs, &mut shift);
         let along = self.dot(&shift, &y);

@@ -176,16 +176,17 @@ impl<'a> ImpactProblem<'a> {
         (mesh.len() - 1) * (self.degree + 1) * self.scales.len()
     }
 
-    /// The flights of `u`.
-    fn flights(&self, u: &[f64], mesh: &Mesh) -> Flights {
-        let (n, all, size) = (self.n(), self.scales.len(), self.size_on(mesh));
+    /// The flights of `u`, with a mesh interval for each part between switchings, and a tangent on that mesh.
+    pub(crate) fn flights(&self, u: &[f64], tangent: &[f64]) -> (Flights, Vec<f64>) {
+        let (n, all, size) = (self.n(), self.scales.len(), self.size_on(&self.mesh()));
+        let (mesh, profile, tangent) = self.with(|inner| inner.cut(u, tangent));
         let flight = |i: usize| {
-            let rows = u[..size].chunks_exact(all).map(|row| &row[i * (n + 1)..i * (n + 1) + n]);
+            let rows = profile.chunks_exact(all).map(|row| &row[i * (n + 1)..i * (n + 1) + n]);
             (u[i * (n + 1) + n], rows.flatten().copied().collect())
         };
         let phase = if self.is_forced() { u[size + 1] } else { 0.0 };
         let flights = (0..self.count()).map(flight).collect();
-        Flights { phase, events: self.segments.events.clone(), mesh: mesh.clone(), flights }
+        (Flights { phase, events: self.segments.events.clone(), mesh, flights }, tangent)
     }
 
     /// The unknowns of flights, with those of the given parameters, on the mesh of the flights.
@@ -211,16 +212,15 @@ impl<'a> ImpactProblem<'a> {
         self.setting.at(&u[u.len() - self.setting.axes.len()..])
     }
 
-    /// f of the field at single points, with times.
-    fn rates(&self, parameters: &[f64], x: &[f64], times: &[f64]) -> Vec<f64> {
-        let mut f = vec![0.0; x.len()];
-        let parameters = Parameters::Shared(parameters);
-        self.setting.field.evaluate(Batch { lanes: 1, states: x, parameters, times, signs: &[] }, &mut f);
-        f
+    /// f at mesh node j of flight i, from [`CycleProblem::rates_at_nodes`], whose unit of time is the flight.
+    fn rate(&self, rates: &[f64], u: &[f64], j: usize, i: usize) -> Vec<f64> {
+        let (n, all) = (self.n(), self.scales.len());
+        let own = j * all + i * (n + 1);
+        rates[own..own + n].iter().map(|f| f / u[i * (n + 1) + n]).collect()
     }
 
-    /// S of (1) at the end of flight i, `[n × n]`.
-    fn saltation(&self, parameters: &[f64], i: usize, [before, after]: [&[f64]; 2], times: &[f64]) -> Vec<f64> {
+    /// S of (1) at the end of flight i, `[n × n]`, with the state and f before it and f after it.
+    fn saltation(&self, parameters: &[f64], i: usize, [before, f, g]: [&[f64]; 3], times: &[f64]) -> Vec<f64> {
         let (n, field, event) = (self.n(), self.setting.field, self.segments.events[i]);
         let at = Batch { lanes: 1, states: before, parameters: Parameters::Shared(parameters), times, signs: &[] };
         let [mut r, mut rx, mut rt] = [1, n, 1].map(|size| vec![0.0; n * size]);
@@ -230,12 +230,11 @@ impl<'a> ImpactProblem<'a> {
         field.linearise_switches(at, &[], [&mut h, &mut hx, &mut [], &mut ht]);
         let surface = switches - field.event_count() + event;
         let gradient = &hx[surface * n..(surface + 1) * n];
-        let [f, g] = [before, after].map(|x| self.rates(parameters, x, times));
         // Beyond an impact grazing, where there is no motion, the multipliers come back from infinity with the same sign, so
         // that nothing seems to change there.
-        let speed = self.signs[i] * (dot(gradient, &f) + ht[surface]).abs();
+        let speed = self.signs[i] * (dot(gradient, f) + ht[surface]).abs();
         let entry = |a: usize, b: usize| {
-            let jump = g[a] - dot(&rx[a * n..(a + 1) * n], &f) - rt[a];
+            let jump = g[a] - dot(&rx[a * n..(a + 1) * n], f) - rt[a];
             rx[a * n + b] + jump * gradient[b] / speed
         };
         (0..n * n).map(|k| entry(k / n, k % n)).collect()
@@ -248,10 +247,10 @@ impl<'a> ImpactProblem<'a> {
         let rows: Vec<f64> = (0..self.setting.axes.len() * unknowns)
             .map(|k| 0.6 + (k as f64 * 0.0113).sin() + 0.7 * (k as f64 * 1.37).cos())
             .collect();
-        let chain = self.with(|inner| {
+        let (chain, rates) = self.with(|inner| {
             inner.residual(u, &mut vec![0.0; unknowns]).then_some(())?;
             inner.factorise(u, &rows).ok()?;
-            Some(inner.transitions())
+            Some((inner.transitions(), inner.rates_at_nodes(u)))
         })?;
         let (parameters, block) = (self.parameters_at(u), (self.degree + 1) * all);
         let mut end = vec![0.0; all];
@@ -272,13 +271,12 @@ impl<'a> ImpactProblem<'a> {
                 let part: Vec<f64> = (0..n * n).map(|at| step[(own + at / n) * all + own + at % n]).collect();
                 whole = product(&part, &whole);
             }
-            let next = (i + 1) % count * (n + 1);
-            let states = [&end[own..own + n], &u[next..next + n]];
-            product(&self.saltation(&parameters, i, states, &times(1.0, i)), &whole)
+            let f = self.rate(&rates, u, mesh.len() - 1, i);
+            let g = self.rate(&rates, u, 0, (i + 1) % count);
+            product(&self.saltation(&parameters, i, [&end[own..own + n], &f, &g], &times(1.0, i)), &whole)
         };
         let transitions: Vec<Vec<f64>> = (0..count).map(transition).collect();
-        let rate = self.rates(&parameters, &u[..n], &times(0.0, 0));
-        Some(Returns { transitions, rate })
+        Some(Returns { transitions, rate: self.rate(&rates, u, 0, 0) })
     }
 
     /// Flight in which a normalised time of the stored cycle lies, and its share of the duration.
@@ -299,23 +297,29 @@ impl<'a> ImpactProblem<'a> {
         self.segments.events.iter().position(|own| *own == event).map_or(1.0, |k| self.signs[k])
     }
 
-    /// The switch of an event at a share of a flight.
-    pub(crate) fn surface(&self, u: &[f64], flight: usize, share: f64, event: usize) -> f64 {
-        let (n, all, mesh) = (self.n(), self.scales.len(), self.mesh());
-        let block = (self.degree + 1) * all;
-        let j = mesh.partition_point(|node| *node <= share).clamp(1, mesh.len() - 1) - 1;
-        let mut x = vec![0.0; all];
-        let s = (share - mesh[j]) / (mesh[j + 1] - mesh[j]);
-        Scheme::of(self.degree).value_into(s, &u[j * block..(j + 1) * block], &mut x);
-        let last = |i: usize| x[i * (n + 1) + n];
-        let time = u[self.size_on(&mesh) + 1] + (0..flight).map(last).sum::<f64>() + share * last(flight);
-        let times = if self.is_forced() { vec![time] } else { Vec::new() };
-        let own = &x[flight * (n + 1)..flight * (n + 1) + n];
-        stored::surfaces(self.setting.field, &self.parameters_at(u), own, &times)[event]
+    /// All switches at shares of a flight.
+    pub(crate) fn switches_on<'b>(&'b self, u: &[f64], flight: usize) -> impl Fn(f64) -> Vec<f64> + use<'a, 'b> {
+        let ((flights, _), parameters) = (self.flights(u, &[]), self.parameters_at(u));
+        let (n, block, degree) = (self.n(), (self.degree + 1) * self.n(), self.degree);
+        let begin = flights.phase + flights.flights[..flight].iter().map(|(last, _)| last).sum::<f64>();
+        let field = self.setting.field;
+        let forced = self.is_forced();
+        move |share| {
+            let (mesh, (last, profile)) = (&flights.mesh, &flights.flights[flight]);
+            let j = mesh.partition_point(|node| *node <= share).clamp(1, mesh.len() - 1) - 1;
+            let mut x = vec![0.0; n];
+            let s = (share - mesh[j]) / (mesh[j + 1] - mesh[j]);
+            Scheme::of(degree).value_into(s, &profile[j * block..(j + 1) * block], &mut x);
+            let times = if forced { vec![begin + share * last] } else { Vec::new() };
+            let mut values = vec![0.0; field.switch_count()];
+            let shared = Parameters::Shared(&parameters);
+            field.switches(Batch { lanes: 1, states: &x, parameters: shared, times: &times, signs: &[] }, &mut values);
+            values
+        }
     }
 
-    /// Multipliers from transitions of the boundary-value problem, `[N][all × all]`.
-    fn floquet(&self, u: &[f64], mesh: &Mesh, transitions: &[f64]) -> Floquet {
+    /// Multipliers from transitions `[N][all × all]` and f at the nodes of the boundary-value problem.
+    fn floquet(&self, u: &[f64], mesh: &Mesh, transitions: &[f64], rates: &[f64]) -> Floquet {
         let (n, all, count) = (self.n(), self.scales.len(), self.count());
         let (scheme, block) = (Scheme::of(self.degree), (self.degree + 1) * all);
         let parameters = self.parameters_at(u);
@@ -332,16 +336,14 @@ impl<'a> ImpactProblem<'a> {
                 own.clone()
                     .for_each(|row| chain.extend_from_slice(&all_of[row * all + own.start..row * all + own.end]));
                 if !self.is_forced() {
-                    let x = &u[j * block + own.start..j * block + own.end];
-                    flow.extend(self.rates(&parameters, x, &[]));
+                    flow.extend(self.rate(rates, u, j, i));
                 }
             }
-            let before = &end[own];
-            let next = (i + 1) % count * (n + 1);
-            let after = &u[next..next + n];
-            chain.extend(self.saltation(&parameters, i, [before, after], &times));
+            let f = self.rate(rates, u, intervals, i);
+            let g = self.rate(rates, u, 0, (i + 1) % count);
+            chain.extend(self.saltation(&parameters, i, [&end[own], &f, &g], &times));
             if !self.is_forced() {
-                flow.extend(self.rates(&parameters, before, &[]));
+                flow.extend(f);
             }
         }
         flow.iter_mut().enumerate().for_each(|(k, f)| *f /= self.setting.scales[k % n]);
@@ -354,7 +356,7 @@ impl<'a> ImpactProblem<'a> {
         let mesh = self.mesh();
         let fine = super::mesh::denser(&mesh);
         let mut inner = self.fresh(&fine);
-        let mut better = self.with(|own| own.transfer(u, &mesh, &fine));
+        let mut better = self.with(|own| own.carry(u, &mesh, &fine));
         inner.anchor(&better);
         let count = better.len();
         // Any row serves that is not orthogonal to the curve.
@@ -370,8 +372,20 @@ impl<'a> ImpactProblem<'a> {
             better.iter_mut().zip(&step).for_each(|(u, d)| *u -= d);
         }
         inner.factorise(&better, &row).ok()?;
-        let transitions = inner.transitions();
-        Some(self.floquet(&better, &fine, &transitions).multipliers)
+        let (transitions, rates) = (inner.transitions(), inner.rates_at_nodes(&better));
+        let mut found = self.floquet(&better, &fine, &transitions, &rates).multipliers;
+        if inner.slides() {
+            self.without_lost(&mut found);
+        }
+        Some(found)
+    }
+
+    /// Sets the multiplier of a direction that is lost along a slide to 0, which it is up to rounding.
+    fn without_lost(&self, multipliers: &mut [Complex64]) {
+        let trivial = usize::from(!self.is_forced());
+        if let Some(least) = multipliers[trivial..].iter_mut().min_by(|a, b| a.norm().total_cmp(&b.norm())) {
+            *least = Complex64::ZERO;
+        }
     }
 
     /// Flights of a stored point, in the order of this problem, and the one of the stored order with which they begin.
@@ -426,6 +440,10 @@ impl ZeroProblem for ImpactProblem<'_> {
         self.with(|inner| inner.residual(u, r)) && unit > 0.0 && unit.is_finite()
     }
 
+    fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
+        self.with(|inner| inner.obstacle(u))
+    }
+
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.with(|inner| inner.factorise(u, rows))
     }
@@ -458,6 +476,18 @@ impl ZeroProblem for ImpactProblem<'_> {
         self.with(|inner| inner.transfer(v, from, to))
     }
 
+    fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        self.with(|inner| inner.carry(u, from, to))
+    }
+
+    fn blended(&self, solutions: &[&[f64]], weights: &[f64]) -> Vec<f64> {
+        self.with(|inner| inner.blended(solutions, weights))
+    }
+
+    fn is_switched(&self) -> bool {
+        self.with(|inner| inner.is_switched())
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         self.with(|inner| inner.better_mesh(u, tolerance))
     }
@@ -476,8 +506,12 @@ impl ZeroProblem for ImpactProblem<'_> {
 
     fn stability(&mut self, u: &[f64]) -> Examination {
         let mesh = self.mesh();
-        let transitions = self.with(|inner| inner.transitions());
-        let found = self.floquet(u, &mesh, &transitions);
+        let (transitions, rates, slides) =
+            self.with(|inner| (inner.transitions(), inner.rates_at_nodes(u), inner.slides()));
+        let mut found = self.floquet(u, &mesh, &transitions, &rates);
+        if slides {
+            self.without_lost(&mut found.multipliers);
+        }
         let trivial = usize::from(!self.is_forced());
         let trivial_defect = if trivial > 0 { (found.multipliers[0].re - 1.0).abs() } else { 0.0 };
         let trust = Trust { trivial_defect, spectrum: f64::NAN, ..Trust::default() };
@@ -491,7 +525,7 @@ impl ZeroProblem for ImpactProblem<'_> {
         found.trust.residual = inner.residual;
         found.trust.slope = inner.slope;
         let (field, parameters) = (self.setting.field, self.parameters_at(u));
-        let cycle = self.flights(u, &self.mesh()).cycle(self.degree, self.segments.forcing_periods, 1.0);
+        let cycle = self.flights(u, &[]).0.cycle(self.degree, self.segments.forcing_periods, 1.0);
         let (scheme, data) = (Scheme::of(self.degree), [&cycle.profile[..], &cycle.mesh[..]]);
         found.ranges = extremes::of_profile(field, &parameters, data, cycle.forcing_periods, scheme);
         found.averages = averages::of_profile(field, &parameters, data, cycle.forcing_periods, scheme);
@@ -529,14 +563,14 @@ impl ZeroProblem for ImpactProblem<'_> {
         let parameters = self.parameters_at(u);
         let q = self.segments.forcing_periods;
         let unit = if q > 0 { self.setting.field.time_unit(&parameters) } else { 1.0 };
-        let flights = self.flights(u, &self.mesh());
+        let (flights, tangent) = self.flights(u, tangent);
         // Stored flights begin with the first one of the period.
         let first = if q > 0 { flights.first(q) } else { 0 };
         Point {
             position: 0,
             solution: Solution::Cycle(flights.cycle(self.degree, q, unit)),
             parameters,
-            tangent: self.rotated(tangent, first),
+            tangent: self.rotated(&tangent, first),
             step: 0.0,
             spectrum: examination.spectrum,
             unstable: examination.unstable,
@@ -568,7 +602,7 @@ impl ZeroProblem for ImpactProblem<'_> {
         if point.tangent.len() != own.len() {
             return Vec::new();
         }
-        let u = self.transfer(&own, &flights.mesh, &mesh);
+        let u = self.carry(&own, &flights.mesh, &mesh);
         let tangent = self.transfer(&self.rotated(&point.tangent, first), &flights.mesh, &mesh);
         let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
         if self.dot(&off, &off) <= within * within { vec![[u, tangent]] } else { Vec::new() }

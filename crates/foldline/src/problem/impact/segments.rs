@@ -12,6 +12,9 @@
 //!   (3)  Σ T_i = q
 //! ```
 //!
+//! A switch of f that is no event has a copy for each flight, with the number i·(switches) + s: at one value of s, several
+//! flights may pass their surfaces, or slide along them, without regard to each other.
+//!
 //! (3) and the phase φ of the first event, which it determines, exist for a forced field only, whose time τ is measured
 //! in forcing periods. The events fix the phase of an autonomous cycle.
 //!
@@ -188,6 +191,59 @@ impl VectorField for Segments<'_> {
         }
     }
 
+    fn switch_count(&self) -> usize {
+        self.events.len() * self.kinks()
+    }
+
+    fn are_independent(&self, one: usize, other: usize) -> bool {
+        one / self.kinks() != other / self.kinks()
+    }
+
+    fn switch_name(&self, switch: usize) -> String {
+        self.field.switch_name(switch % self.kinks())
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        let size = self.kinks() * at.lanes;
+        let mut all = vec![0.0; self.field.switch_count() * at.lanes];
+        for i in 0..self.events.len() {
+            let flight = self.flight(&at, i);
+            self.field.switches(self.inner(&at, i, &flight), &mut all);
+            out[i * size..(i + 1) * size].copy_from_slice(&all[..size]);
+        }
+    }
+
+    fn linearise_switches(&self, at: Batch, free: &[usize], [h, hx, hp, ht]: [&mut [f64]; 4]) {
+        let (n, lanes, q, all, kinks) = (self.n(), at.lanes, free.len(), self.dim(), self.kinks());
+        let (own_free, columns) = self.own_free(free);
+        let count = self.field.switch_count();
+        let [mut own_h, mut own_hx, mut own_hp, mut in_time] =
+            [1, n, own_free.len(), 1].map(|size| vec![0.0; count * size * lanes]);
+        hx.fill(0.0);
+        hp.fill(0.0);
+        for i in 0..self.events.len() {
+            let flight = self.flight(&at, i);
+            let to = [&mut own_h[..], &mut own_hx, &mut own_hp, &mut in_time];
+            self.field.linearise_switches(self.inner(&at, i, &flight), &own_free, to);
+            let first = i * (n + 1);
+            for (s, l) in (0..kinks * lanes).map(|k| (k / lanes, k % lanes)) {
+                let row = i * kinks + s;
+                let later = if self.forced_inside() { in_time[s * lanes + l] } else { 0.0 };
+                h[row * lanes + l] = own_h[s * lanes + l];
+                ht[row * lanes + l] = later * flight.lasts[l];
+                for b in 0..n {
+                    hx[(row * all + first + b) * lanes + l] = own_hx[(s * n + b) * lanes + l];
+                }
+                hx[(row * all + first + n) * lanes + l] = later * at.times.get(l).copied().unwrap_or(0.0);
+                (0..i).for_each(|j| hx[(row * all + j * (n + 1) + n) * lanes + l] = later);
+                for (c, column) in columns.iter().enumerate() {
+                    hp[(row * q + column) * lanes + l] = own_hp[(s * own_free.len() + c) * lanes + l];
+                }
+                self.of_phase(free).for_each(|column| hp[(row * q + column) * lanes + l] = later);
+            }
+        }
+    }
+
     fn conditions(&self) -> [usize; 2] {
         [self.dim() + usize::from(self.forced_inside()), 0]
     }
@@ -266,4 +322,88 @@ impl VectorField for Nothing {
     fn linearise(&self, _at: Batch, _free: &[usize], _f: &mut [f64], _fx: &mut [f64], _fp: &mut [f64]) {}
 
     fn directional(&self, _at: Batch, _directions: &[&[f64]], _out: &mut [f64]) {}
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Event, Forcing, Model, ModelSource, Parameter, State};
+
+    /// An oscillator with a wall and a spring whose end moves.
+    fn model() -> Model {
+        Model::compile(ModelSource {
+            parameters: vec![Parameter::new("w", 1.3), Parameter::new("g", 0.4)],
+            forcing: Some(Forcing { is_frequency: true, expression: "w".into() }),
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![
+                Definition::new("x", "v"),
+                Definition::new("v", "-x - 3*max(x - g*sin(w*t), 0) - 0.2*sign(v)"),
+            ],
+            events: vec![Event {
+                name: "wall".into(),
+                when: "x - 1".into(),
+                set: vec![Definition::new("v", "-0.8*v")],
+                ..Event::default()
+            }],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn derivatives_of_the_switches_of_all_flights_are_exact() {
+        let model = model();
+        let segments = Segments::new(&model, vec![0, 0], 1);
+        let (size, count) = (segments.dim(), segments.switch_count());
+        assert_eq!([size, count], [6, 4]);
+        // x, v and T of both flights; w, g and φ; s.
+        let at = [0.3, -0.5, 0.6, -0.2, 0.7, 0.4, 1.3, 0.4, 0.15, 0.35];
+        let values = |all: &[f64]| {
+            let mut h = vec![0.0; count];
+            let parameters = Parameters::Shared(&all[size..size + 3]);
+            let batch = Batch { lanes: 1, states: &all[..size], parameters, times: &all[size + 3..], signs: &[] };
+            segments.switches(batch, &mut h);
+            h
+        };
+        let [mut h, mut hx, mut hp, mut ht] = [1, size, 3, 1].map(|width| vec![0.0; count * width]);
+        let parameters = Parameters::Shared(&at[size..size + 3]);
+        let batch = Batch { lanes: 1, states: &at[..size], parameters, times: &at[size + 3..], signs: &[] };
+        segments.linearise_switches(batch, &[0, 1, 2], [&mut h, &mut hx, &mut hp, &mut ht]);
+        assert_eq!(h, values(&at));
+        for k in 0..at.len() {
+            let moved = |by: f64| {
+                let mut all = at;
+                all[k] += by;
+                values(&all)
+            };
+            let step = 1e-5;
+            let (more, less) = (moved(step), moved(-step));
+            for row in 0..count {
+                let exact = match k {
+                    k if k < size => hx[row * size + k],
+                    k if k < size + 3 => hp[row * 3 + k - size],
+                    _ => ht[row],
+                };
+                let difference = (more[row] - less[row]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-8, "switch {row}, variable {k}: {exact} {difference}");
+            }
+        }
+    }
+
+    /// Slides of different flights do not disturb each other.
+    #[test]
+    fn two_flights_slide_at_once() {
+        let model = model();
+        let segments = Segments::new(&model, vec![0, 0], 1);
+        let states = [0.05, 0.0, 0.6, -0.02, 0.0, 0.4];
+        let names: Vec<String> = (0..4).map(|switch| segments.switch_name(switch)).collect();
+        let stick = names.iter().position(|name| name == "v").unwrap();
+        assert!(segments.are_independent(stick, stick + 2) && !segments.are_independent(0, 1));
+        let mut signs = [-1.0; 4];
+        (signs[stick], signs[stick + 2]) = (0.0, 0.0);
+        let mut f = vec![0.0; 6];
+        let parameters = Parameters::Shared(&[1.3, 0.4, 0.1]);
+        segments.evaluate(Batch { lanes: 1, states: &states, parameters, times: &[0.2], signs: &signs }, &mut f);
+        assert!([1, 4].iter().all(|row| f[*row].abs() < 1e-14), "{f:?}");
+    }
 }

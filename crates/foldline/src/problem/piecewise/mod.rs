@@ -212,10 +212,11 @@ impl<'a> PiecewiseFlow<'a> {
         let times: Vec<f64> = places.filter_map(|(g, j)| self.time(place(g, j))).collect();
         let values = self.switches(&states, &times);
         let sizes: Vec<f64> = values.chunks_exact(lanes).map(max_abs).collect();
+        let last = self.at_right_end(profile, mesh, &values);
         let could = |switch: usize, j: usize| {
             let own = &values[switch * lanes..(switch + 1) * lanes];
             // With the left end of the next interval.
-            let next = own[(j + 1) % intervals];
+            let next = if j + 1 < intervals { own[j + 1] } else { last[switch] };
             let there = (0..nodes).map(|g| own[g * intervals + j]).chain([next]);
             let [low, high] = there.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
             let near = low.abs().min(high.abs());
@@ -230,6 +231,18 @@ impl<'a> PiecewiseFlow<'a> {
         };
         let suspects = (0..intervals).filter(|j| (0..sizes.len()).any(|switch| could(switch, *j))).collect();
         (suspects, sizes)
+    }
+
+    /// The switches at the right end of the last interval, which an orbit that closes has in common with the first; `values`
+    /// are those at all nodes.
+    fn at_right_end(&self, profile: &[f64], mesh: &[f64], values: &[f64]) -> Vec<f64> {
+        let (n, nodes, lanes) = (self.n(), self.scheme.degree + 1, (mesh.len() - 1) * (self.scheme.degree + 1));
+        if self.setting.field.conditions() == [0, 0] {
+            return values.iter().step_by(lanes).copied().collect();
+        }
+        let mut x = vec![0.0; n];
+        self.scheme.value_into(1.0, &profile[profile.len() - nodes * n..], &mut x);
+        self.switches(&x, self.time(mesh[mesh.len() - 1]).as_slice())
     }
 
     /// Flow from `x` over an interval; `guess` `[m + 1][n]` is a polynomial close to it.
@@ -700,7 +713,8 @@ impl<'a> PiecewiseFlow<'a> {
         }
         let crosses = speed * speed_after > 0.0;
         if !crosses {
-            if signs.contains(&0.0) {
+            let with = (0..signs.len()).filter(|k| signs[*k] == 0.0);
+            if !with.into_iter().all(|k| self.setting.field.are_independent(k, switch)) {
                 return Err(Obstacle::Slides);
             }
             after = self.along_surface(&x, t, signs, switch);

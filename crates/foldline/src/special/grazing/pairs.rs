@@ -104,7 +104,7 @@ mod tests {
         let maximum = |k: usize| all[k].1 > all[(k + 1) % all.len()].1;
         all.iter()
             .enumerate()
-            .map(|(k, (time, value))| Extremum { time: *time, value: *value, maximum: maximum(k) })
+            .map(|(k, (time, value))| Extremum { time: *time, value: *value, maximum: maximum(k), at_event: false })
             .collect()
     }
 
@@ -129,7 +129,7 @@ mod tests {
     #[test]
     fn extrema_of_rounding_are_left_out() {
         let mut all = extrema(&[(0.1, 1.0), (0.2, -1.0), (0.5, 0.0), (0.51, -1e-15), (0.52, 1e-15), (0.8, -0.5)]);
-        all.insert(1, Extremum { time: 0.15, value: 0.5, maximum: true });
+        all.insert(1, Extremum { time: 0.15, value: 0.5, maximum: true, at_event: false });
         let times: Vec<f64> = alternating(all, 1e-11).iter().map(|e| e.time).collect();
         assert_eq!(times, [0.1, 0.2, 0.52, 0.8]);
     }
