@@ -58,7 +58,8 @@ fn agrees(demo: &str) {
     let output = foldline(folder.path(), &["run", study.to_str().unwrap(), "--out", "run", "--quiet"]);
     let said = String::from_utf8_lossy(&output.stderr);
     // A study may state how many points are enough.
-    let complete = said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
+    let complete =
+        said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
     assert!(complete && matches!(output.status.code(), Some(0 | 3)), "{demo}: {said}");
     let found = special_points(folder.path());
     for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {

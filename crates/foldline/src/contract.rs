@@ -3,7 +3,9 @@
 //! **Idea.** The rest of the crate is written against these few object-safe traits. A model may therefore be text,
 //! traced code or native Rust, and a curve may consist of equilibria, cycles or solutions of a new kind of problem.
 
-use crate::diagram::{Branch, Cycle, Design, Ending, Kind, MapCell, Mesh, Point, Responses, SpecialPoint, Symmetry, Trust};
+use crate::diagram::{
+    Branch, Cycle, Design, Ending, Kind, MapCell, Mesh, Point, Responses, SpecialPoint, Symmetry, Trust,
+};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.

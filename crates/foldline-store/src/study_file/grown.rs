@@ -54,7 +54,10 @@ pub fn added(old: &Study, new: &Study) -> Result<Added, String> {
     // The answers in the cells of such a map are about all branches.
     let of_branches = a.maps.iter().find(|own| own.question == Question::Points);
     if let Some(map) = of_branches.filter(|_| found.items.len() > maps.len() || !found.switched.is_empty()) {
-        return Err(format!("the map \"{}\" shows the special points of all branches, of which there are more", map.name));
+        return Err(format!(
+            "the map \"{}\" shows the special points of all branches, of which there are more",
+            map.name
+        ));
     }
     Ok(found)
 }

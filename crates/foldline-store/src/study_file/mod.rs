@@ -79,7 +79,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 21] = [
+const ROOT_KEYS: [&str; 22] = [
     "model",
     "title",
     "description",

@@ -108,13 +108,7 @@ impl Plan {
     }
 
     /// Adds a variable of texts over the given dimensions, with its values.
-    pub fn texts(
-        &mut self,
-        parent: Id,
-        name: &str,
-        dimensions: &[Id],
-        values: impl Iterator<Item = String>,
-    ) -> Id {
+    pub fn texts(&mut self, parent: Id, name: &str, dimensions: &[Id], values: impl Iterator<Item = String>) -> Id {
         let id = self.variable(parent, name, Element::Text, dimensions);
         let places: Vec<Place> = values.map(|text| self.heaps.lay(Lying::Text(text.into_bytes()))).collect();
         if let Kind::Dataset { texts, .. } = &mut self.objects[id].kind {
