@@ -9,9 +9,8 @@ use std::process::{Command, Output};
 
 const REFERENCE: &str = include_str!("reference/auto.csv");
 
-/// Largest relative difference. AUTO ends the location of a special point when the next step in arclength is below its
-/// tolerance of 1e-7; a quantity may change up to ten times faster than the arclength, in its units. Nothing was found to differ
-/// by more than a third of this.
+/// Largest relative difference: ten times AUTO's tolerance for the location of special points, because a quantity may change
+/// that much faster than the arclength in which it locates them.
 const WITHIN: f64 = 1e-6;
 
 fn foldline(folder: &Path, arguments: &[&str]) -> Output {
@@ -58,7 +57,8 @@ fn agrees(demo: &str) {
     let output = foldline(folder.path(), &["run", study.to_str().unwrap(), "--out", "run", "--quiet"]);
     let said = String::from_utf8_lossy(&output.stderr);
     // A study may state how many points are enough.
-    let complete = said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
+    let complete =
+        said.lines().filter(|line| line.starts_with("incomplete")).all(|line| line.contains("stopped at the limit of"));
     assert!(complete && matches!(output.status.code(), Some(0 | 3)), "{demo}: {said}");
     let found = special_points(folder.path());
     for line in REFERENCE.lines().filter(|line| !line.starts_with('#')) {

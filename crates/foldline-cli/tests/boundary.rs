@@ -284,7 +284,8 @@ fn a_fold_is_followed_in_the_rate_and_the_length_of_the_slab() {
 #[test]
 fn ignition_and_extinction_meet_in_a_cusp() {
     let branch = seeded("state = \"zero\"", "p", "[0, 12]", "stop = { u_max = 20 }");
-    let (study, diagram) = of("thermal-explosion", &format!("{branch}{}", curve("fold", "e", "[0.1, 0.3]", "[0.1, 0.23]")));
+    let (study, diagram) =
+        of("thermal-explosion", &format!("{branch}{}", curve("fold", "e", "[0.1, 0.3]", "[0.1, 0.23]")));
     complete(&diagram);
     let [cusp] = of_kind(diagram.branch("c").unwrap(), Kind::Cusp)[..] else { panic!() };
     near(value(&study.model, "p", &cusp.point), 5.229494254693, 1e-9);
@@ -306,8 +307,7 @@ fn buckling_loads_are_followed_in_the_stiffness_of_a_foundation() {
     let branch = seeded("state = \"zero\"", "p", "[5, 20]", "");
     let slopes = [1.0, 1.0 / (PI * PI)];
     for (model, slope) in [rod, beam].into_iter().zip(slopes) {
-        let (study, diagram) =
-            given(model, &format!("{branch}{}", curve("branch-point", "k", "[-2, 5]", "[-1, 4]")));
+        let (study, diagram) = given(model, &format!("{branch}{}", curve("branch-point", "k", "[-2, 5]", "[-1, 4]")));
         complete(&diagram);
         let found = on_curve(&study, &diagram, ["p", "k"]);
         assert_eq!(found.len(), 2, "{found:?}");

@@ -243,7 +243,9 @@ fn a_crossing_for_an_isolated_value_is_followed_in_three_parameters() {
         let [mu, q, c] = point.parameters[..] else { panic!() };
         assert!((mu - q * q).abs() < 1e-9 && (c - q / 10.0).abs() < 1e-9, "{mu} {q} {c}");
     }
-    let [mark] = &curve.special[..] else { panic!("{:?}", curve.special.iter().map(|s| s.kind).collect::<Vec<Kind>>()) };
+    let [mark] = &curve.special[..] else {
+        panic!("{:?}", curve.special.iter().map(|s| s.kind).collect::<Vec<Kind>>())
+    };
     assert!((mark.point.parameters[0] - 1.5625).abs() < mark.error.max(1e-9));
     // In two parameters there is no curve, and the message says so.
     let two = grown(model, &format!("{seed}{PLAN}range = [0.5, 1.5]\n"));

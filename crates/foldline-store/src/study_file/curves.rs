@@ -327,7 +327,11 @@ fn third(
     }
     let entries: Vec<_> = value.get_ref().as_table().into_iter().flat_map(|table| table.iter()).collect();
     let [(key, own)] = entries[..] else {
-        walk.report(value.span(), "`also` names one parameter with its range", "a line such as `also = { q = [0, 1] }`");
+        walk.report(
+            value.span(),
+            "`also` names one parameter with its range",
+            "a line such as `also = { q = [0, 1] }`",
+        );
         return None;
     };
     let name: &str = key.get_ref();
