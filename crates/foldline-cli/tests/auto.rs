@@ -9,9 +9,8 @@ use std::process::{Command, Output};
 
 const REFERENCE: &str = include_str!("reference/auto.csv");
 
-/// Largest relative difference. AUTO ends the location of a special point when the next step in arclength is below its
-/// tolerance of 1e-7; a quantity may change up to ten times faster than the arclength, in its units. Nothing was found to differ
-/// by more than a third of this.
+/// Largest relative difference: ten times AUTO's tolerance for the location of special points, because a quantity may change
+/// that much faster than the arclength in which it locates them.
 const WITHIN: f64 = 1e-6;
 
 fn foldline(folder: &Path, arguments: &[&str]) -> Output {
