@@ -47,7 +47,6 @@ pub(super) const STEP_LIMIT: usize = 60_000;
 pub(crate) const PERSISTENT: usize = 1_000_000;
 
 /// A solution and its hits.
-#[derive(Clone)]
 struct Reached {
     orbit: Orbit,
     hits: usize,
@@ -59,27 +58,6 @@ struct Reached {
     number: usize,
     /// Early decisions for it, about trajectories that were followed until they had settled.
     forecasts: Forecasts,
-}
-
-/// Solutions reached in earlier samplings for a map, with the decisions about them.
-#[derive(Clone, Default)]
-pub struct Memory {
-    reached: Vec<Reached>,
-}
-
-impl Memory {
-    /// The solutions, without hits.
-    fn recalled(&self) -> Vec<Reached> {
-        let fresh = |(number, own): (usize, &Reached)| Reached { hits: 0, uniform: 0, first: 0, number, ..own.clone() };
-        self.reached.iter().enumerate().map(fresh).collect()
-    }
-
-    fn keep(&mut self, reached: &[Reached]) {
-        self.reached = reached.to_vec();
-        // A solution that was found late may have enough decisions by now.
-        let late = self.reached.iter_mut().filter(|own| own.orbit.early.is_none());
-        late.for_each(|own| own.orbit.early = own.forecasts.radius());
-    }
 }
 
 /// Decisions at each distance of [`RADII`].
@@ -113,28 +91,15 @@ pub(super) fn survey(
     polish: Polish,
     (pace, enough): (Pace, Enough),
 ) -> Census {
-    survey_again(field, parameters, sampling, polish, (pace, enough), &mut Memory::default())
-}
-
-/// Samples like [`survey`]; solutions in memory are known from the beginning, and those found are kept there.
-pub(super) fn survey_again(
-    field: &dyn VectorField,
-    parameters: &[f64],
-    sampling: &Sampling,
-    polish: Polish,
-    (pace, enough): (Pace, Enough),
-    memory: &mut Memory,
-) -> Census {
     let n = field.dim();
     let Pace { block, accuracy, rounds, map } = pace;
     let context = Context { field, parameters, sampling, polish, accuracy };
     let starts = sampling.starts();
     let blocks: Vec<&[f64]> = starts.chunks((block * n).max(1)).collect();
-    let mut reached = memory.recalled();
+    let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
     let (mut taken, mut ended) = (0, false);
-    let learned = Manner { patience: patience(sampling.limits.steps), early: true };
-    let (mut manner, mut rounds_done) = if map && !reached.is_empty() { (learned, 2) } else { (Manner::default(), 0) };
+    let (mut manner, mut rounds_done) = (Manner::default(), 0);
     while taken < blocks.len() && !ended && !field.ended() {
         let round = [1, rounds[0], rounds[1]][rounds_done.min(2)].min(blocks.len() - taken);
         for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough, manner) {
@@ -146,12 +111,11 @@ pub(super) fn survey_again(
         }
         rounds_done += 1;
         if map && rounds_done == 2 {
-            manner = learned;
+            manner = Manner { patience: patience(sampling.limits.steps), early: true };
             reached.iter_mut().for_each(|known| known.orbit.early = known.forecasts.radius());
         }
     }
     census.left += sampling.samples.saturating_sub(taken * block);
-    memory.keep(&reached);
     // A lower limit was asked for.
     let limited = sampling.limits.steps < STEP_LIMIT;
     if block == Pace::BRIEF.block && !limited && !ended && !field.ended() {

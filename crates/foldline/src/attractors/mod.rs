@@ -51,13 +51,13 @@ mod window;
 use angles::Rolled;
 pub(crate) use angles::gained;
 pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
+pub use census::Lost;
 pub(crate) use census::PERSISTENT;
 use census::Pace;
 use census::STEP_LIMIT;
-pub use census::{Lost, Memory};
 use runner::PATIENT;
-pub(crate) use sampling::SplitMix64;
 pub use sampling::{Sampling, stratified};
+pub(crate) use sampling::SplitMix64;
 pub use settling::Trial;
 pub(crate) use spectrum::ratio_of_samples;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
@@ -223,21 +223,6 @@ pub fn survey_until(
 /// would have been wrong; one in 64 is followed further to check that ([`Census::early`]).
 pub fn survey_map(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
     survey_at(field, parameters, sampling, polish, (Pace::MAP, &|_| false))
-}
-
-/// Samples like [`survey_map`], one set of initial states after the other: what the first ones show about the attractors is kept
-/// in `memory` for the next. Only for autonomous fields without angles; for others nothing is kept.
-pub fn survey_map_again(
-    field: &dyn VectorField,
-    parameters: &[f64],
-    sampling: &Sampling,
-    polish: Polish,
-    memory: &mut Memory,
-) -> Census {
-    if field.iterated() || field.forced() || Rolled::new(field).is_some() {
-        return survey_map(field, parameters, sampling, polish);
-    }
-    census::survey_again(field, parameters, sampling, polish, (Pace::MAP, &|_| false), memory)
 }
 
 fn survey_at(

@@ -1,12 +1,12 @@
 //! Fates of initial states that are chosen one set after the other.
 //!
-//! **Idea.** Each set is a sampling of its own, which knows what the earlier ones showed. The attractors known before take part in it with a state of each, so that the
+//! **Idea.** Each set is a sampling of its own. The attractors known before take part in it with a state of each, so that the
 //! trajectories from these say which of them an attractor of the set is.
 
 use super::System;
 use super::basins::spread;
-use super::seeds::map_again;
-use crate::attractors::{Attractor, Fate, Memory};
+use super::seeds::map;
+use crate::attractors::{Attractor, Fate};
 use crate::diagram::{Point, Solution};
 
 /// Sets of initial states, and the attractors that they reached.
@@ -15,14 +15,13 @@ pub(super) struct Rounds<'a> {
     parameters: &'a [f64],
     jobs: usize,
     tolerance: f64,
-    memory: Memory,
     /// In the order in which they were found; their `hits` do not count the states of known attractors.
     pub(super) attractors: Vec<Attractor>,
 }
 
 impl<'a> Rounds<'a> {
     pub(super) fn new(system: &'a System<'a>, parameters: &'a [f64], jobs: usize, tolerance: f64) -> Rounds<'a> {
-        Rounds { system, parameters, jobs, tolerance, memory: Memory::default(), attractors: Vec::new() }
+        Rounds { system, parameters, jobs, tolerance, attractors: Vec::new() }
     }
 
     /// True if the run is to end.
@@ -41,8 +40,7 @@ impl<'a> Rounds<'a> {
         let mut all: Vec<f64> = self.attractors.iter().flat_map(|own| state_of(&own.point, n)).collect();
         let order = spread(count);
         order.iter().for_each(|k| all.extend_from_slice(&starts[k * n..(k + 1) * n]));
-        let settings = (self.jobs, self.tolerance);
-        let census = map_again(self.system, self.parameters, all, settings, &mut self.memory);
+        let census = map(self.system, self.parameters, all, self.jobs, self.tolerance);
         let mut place: Vec<Option<usize>> = vec![None; census.attractors.len()];
         for (k, fate) in census.fates.iter().take(known).enumerate() {
             if let Fate::Settled(local) = fate {

@@ -1,8 +1,8 @@
 //! Plane sections that are computed where the fate changes.
 //!
 //! **Idea.** The cells of a section are covered by blocks that share their edges. The fates at the corners and in the middle of
-//! each are computed. If all known fates agree in a block and around it, to half of its length, it is filled; otherwise
-//! it is divided into four. Boundaries are thus followed to single cells, also where they are interrupted. At the end some of the filled cells, drawn
+//! each are computed. A block in which all known fates agree, those of smaller neighbours on its edges included, is filled; any
+//! other one is divided into four. Boundaries are thus followed to single cells. At the end some of the filled cells, drawn
 //! at random, are computed too: how many of them are wrong is the error rate of the filled ones. Blocks with a wrong cell are
 //! divided further.
 //!
@@ -59,13 +59,6 @@ impl Block {
     fn needed(&self) -> impl Iterator<Item = [usize; 2]> {
         let middle = if self.is_least() { None } else { Some(self.middle()) };
         self.corners().into_iter().chain(middle)
-    }
-
-    /// Returns the block with half of its length added on every side, within a section.
-    fn widened(&self, cells: [usize; 2]) -> Block {
-        let margin = [self.columns, self.rows].iter().map(|[a, b]| b - a).max().unwrap_or(0).div_ceil(2);
-        let wider = |[a, b]: [usize; 2], count: usize| [a.saturating_sub(margin), (b + margin).min(count - 1)];
-        Block { columns: wider(self.columns, cells[0]), rows: wider(self.rows, cells[1]) }
     }
 
     fn cells(self) -> impl Iterator<Item = [usize; 2]> {
@@ -150,7 +143,7 @@ pub fn adaptive(
     while !system.field.ended() {
         let (mut kept, mut divided) = (Vec::new(), Vec::new());
         for block in blocks {
-            match section.common(&block.widened(plane.cells)) {
+            match section.common(&block) {
                 _ if block.is_least() => {}
                 Some(_) => kept.push(block),
                 None => divided.extend(block.parts()),

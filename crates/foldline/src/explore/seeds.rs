@@ -18,7 +18,7 @@ use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use super::profile::{Spread, first_profile, with_degree};
 use super::tori;
-use crate::attractors::{self, Attractor, Candidate, Census, Fate, Limits, Lost, Memory, Sampling, Trial};
+use crate::attractors::{self, Attractor, Candidate, Census, Fate, Limits, Lost, Sampling, Trial};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer, Unobserved, Verdict};
@@ -368,20 +368,6 @@ pub(super) fn map(system: &System, parameters: &[f64], starts: Vec<f64>, jobs: u
     attractors::survey_map(system.field, parameters, &sampling, &|candidate| {
         polish(system, parameters, tolerance, candidate)
     })
-}
-
-/// Fates of given initial states like [`map`], with what earlier sets of them showed.
-pub(super) fn map_again(
-    system: &System,
-    parameters: &[f64],
-    starts: Vec<f64>,
-    (jobs, tolerance): (usize, f64),
-    memory: &mut Memory,
-) -> Census {
-    let samples = starts.len() / system.field.dim().max(1);
-    let sampling = Sampling { given: Some(starts), ..sampling(system, samples, 0, jobs, tolerance) };
-    let polish = |candidate: &Candidate| polish(system, parameters, tolerance, candidate);
-    attractors::survey_map_again(system.field, parameters, &sampling, &polish, memory)
 }
 
 pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
