@@ -12,7 +12,7 @@ use foldline_store::run_file::Part;
 use num_complex::Complex64;
 use std::io::{Write, stderr, stdout};
 
-/// Amplitudes and frequency as they were typed.
+/// Amplitudes and frequency given on the command line.
 struct Asked<'t> {
     /// State, expression and whether it is multiplied by i.
     forces: Vec<(usize, &'t str, bool)>,

@@ -38,7 +38,7 @@ struct Still {
     fx: Vec<f64>,
 }
 
-/// What is needed to test whether a map is a symmetry.
+/// A system at parameter values, with the points at which (1) is tested.
 struct Test<'a, 's> {
     system: &'a System<'s>,
     parameters: &'a [f64],
