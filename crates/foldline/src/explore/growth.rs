@@ -954,12 +954,6 @@ impl Growth<'_> {
         if special.kind == Kind::ImpactGrazing {
             return Coefficients { remark: special.remark.clone(), ..Coefficients::default() };
         }
-        if let Solution::Cycle(cycle) = &special.point.solution
-            && !impacts(system.field, &special.point.parameters, cycle).is_empty()
-            && special.kind != Kind::Mark
-        {
-            return Coefficients::none("normal forms of cycles with impacts are not computed");
-        }
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
                 Kind::Grazing if special.remark.is_empty() => grazing::described(system.field, &special.point),
@@ -968,6 +962,12 @@ impl Growth<'_> {
                 _ => grazing::on_surface(system.field, &special.point, &special.remark),
             };
             return Coefficients { remark, ..Coefficients::default() };
+        }
+        if let Solution::Cycle(cycle) = &special.point.solution
+            && !impacts(system.field, &special.point.parameters, cycle).is_empty()
+            && special.kind != Kind::Mark
+        {
+            return Coefficients::none("normal forms of cycles with impacts are not computed");
         }
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
