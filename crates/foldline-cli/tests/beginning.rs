@@ -171,7 +171,7 @@ fn unsupported_features_are_explained() {
         refused(folder.path(), &["check", "study.toml"])
     };
     let expected: [(&str, &[&str]); 9] = [
-        ("map = true", &["study.toml:2:1", "[map] takes the place of [equations]", "next value"]),
+        ("map = true", &["study.toml:2:7", "`map` is not a list of tables", "[[map]]"]),
         ("boundary-conditions = []", &["boundary-value problem", "[boundary]"]),
         ("delays = [1]", &["delay differential equations", "DDE-BIFTOOL"]),
         ("torus = 1", &["invariant tori", "switch = { torus = 1 }"]),

@@ -78,7 +78,7 @@ fn a_wall_and_a_spring_on_one_branch() {
     assert_eq!(doublings.len(), 2, "{doublings:?}");
     assert!(doublings.iter().zip(DOUBLES).all(|(found, known)| (found - known).abs() < 1e-8), "{doublings:?}");
     let remark = &own.special.iter().find(|special| special.kind == Kind::Grazing).unwrap().remark;
-    assert_eq!(remark, "contacts 0 → 1 at -1.2 - x = 0");
+    assert_eq!(remark, "contacts 0 → 1 at -x - 1.2 = 0");
     let last = own.points.iter().max_by(|a, b| a.parameters[0].total_cmp(&b.parameters[0])).unwrap();
     assert!((last.ranges[0][0] - LEAST).abs() < 1e-7, "{:?}", last.ranges);
     let off =

@@ -276,7 +276,7 @@ fn mistakes_about_names_and_starts_of_branches() {
             "name = \"folds\"",
             "\"folds\"",
             "\"folds\" is used twice",
-            "curve, homotopy, exploration, survey, sweep and design question",
+            "curve, homotopy, exploration, survey, sweep, design question and map",
         ),
         (
             "name = \"doublings\"",

@@ -36,7 +36,8 @@ fn of_equations(equations: &[(&str, &str)]) -> usize {
         "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = {{ {state} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-1, 2]\n"
     );
     let study = parse_study(&study, "study", &model, "model").unwrap();
-    System::of_plan(&study.model, &study.plan).symmetries.len()
+    let system = System::of_plan(&study.model, &study.plan);
+    system.symmetries.len() + system.exchanges.len()
 }
 
 #[test]

@@ -219,8 +219,10 @@ pub fn is_study(text: &str) -> bool {
     if root.get_ref().contains_key("equations") {
         return false;
     }
-    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design", "map"];
-    keys.iter().any(|key| root.get_ref().contains_key(*key))
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep", "design"];
+    // `[map]` is that of a model, `[[map]]` a map over parameters.
+    let maps = || root.get_ref().get("map").is_some_and(|map| map.get_ref().is_array());
+    keys.iter().any(|key| root.get_ref().contains_key(*key)) || maps()
 }
 
 fn parse(

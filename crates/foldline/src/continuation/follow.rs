@@ -302,7 +302,7 @@ impl Follow<'_> {
     fn believed_at(&self, kind: Kind) -> f64 {
         match kind {
             Kind::Unexplained => SURE,
-            Kind::BranchPoint if self.settings.symmetries.len() < 2 => CROSSING,
+            Kind::BranchPoint if !self.settings.is_symmetric() => CROSSING,
             _ => f64::INFINITY,
         }
     }

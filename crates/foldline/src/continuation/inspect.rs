@@ -168,10 +168,7 @@ impl Follow<'_> {
                 found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
                 // A singular matrix at which the parameter turns and stability does not change is a pitchfork;
                 // otherwise the step has cut across to another branch.
-                if kind == Kind::Fold
-                    && left.point.unstable == right.point.unstable
-                    && self.settings.symmetries.len() < 2
-                {
+                if kind == Kind::Fold && left.point.unstable == right.point.unstable && !self.settings.is_symmetric() {
                     found = Err(Failure::Unexplained);
                 }
             }
@@ -188,7 +185,7 @@ impl Follow<'_> {
                 && found.as_ref().is_ok_and(|found| {
                     // In a symmetric model the symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
-                        || self.settings.symmetries.len() < 2 && self.is_vertex(&stretch, found.distance, cost)
+                        || !self.settings.is_symmetric() && self.is_vertex(&stretch, found.distance, cost)
                 })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
@@ -510,7 +507,7 @@ impl Follow<'_> {
 
     /// True if a symmetry of the model maps the solution to itself, possibly with a phase shift.
     fn is_symmetric(&self, at: &Point) -> bool {
-        let mut images = self.settings.symmetries.iter().filter(|r| !r.is_identity());
+        let mut images = self.settings.images();
         images.any(|r| at.difference(at, self.settings.measure(), r) < SYMMETRIC)
     }
 
@@ -554,7 +551,7 @@ impl Follow<'_> {
     /// solutions all three are symmetric.
     fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
         let (measure, tolerance) = (self.settings.measure(), self.settings.tolerance);
-        self.settings.symmetries.iter().filter(|r| !r.is_identity()).any(|r| {
+        self.settings.images().any(|r| {
             let here = at.difference(at, measure, r);
             let least = 2.0 * here.max(tolerance);
             here < SYMMETRIC && ends.iter().all(|end| end.point.difference(&end.point, measure, r) > least)

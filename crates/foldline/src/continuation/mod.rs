@@ -75,6 +75,8 @@ pub struct Settings {
     /// Symmetries of the model, the identity first; see
     /// [`crate::diagram::Point::difference`].
     pub symmetries: Vec<Symmetry>,
+    /// Symmetries that permute states.
+    pub exchanges: Vec<Symmetry>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
     /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
@@ -87,6 +89,16 @@ impl Settings {
     /// The measure in which solutions are compared.
     pub(crate) fn measure(&self) -> Measure<'_> {
         Measure { scales: &self.scales, periods: &self.periods }
+    }
+
+    /// Every symmetry but the identity.
+    pub(crate) fn images(&self) -> impl Iterator<Item = &Symmetry> {
+        self.symmetries.iter().filter(|own| !own.is_identity()).chain(&self.exchanges)
+    }
+
+    /// True if the model has a symmetry.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        self.images().next().is_some()
     }
 
     /// Settings for a tolerance and a parameter range.
@@ -105,6 +117,7 @@ impl Settings {
             period_growth: 1e3,
             max_newton: 8,
             symmetries: vec![Symmetry::identity()],
+            exchanges: Vec::new(),
             scales: scales.to_vec(),
             periods: Vec::new(),
             kinks: 0,

@@ -141,6 +141,7 @@ impl<'s> Start<'s> {
             field: &self.field,
             parameter_scales,
             symmetries: vec![Symmetry::identity()],
+            exchanges: Vec::new(),
             mirrors: Vec::new(),
             holds: None,
             unfolded: None,

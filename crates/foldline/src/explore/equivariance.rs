@@ -5,6 +5,10 @@
 //! other. At a point that R leaves in place, values and first derivatives must agree among the states that have an image
 //! already: at 0 for every R, at c (1, …, 1) for permutations without changes of sign.
 //!
+//! Solutions that differ in signs only are one. Solutions that differ in the order of their states are listed separately, because
+//! whoever looks at one of the states sees different motions; that a branch is its own image under an exchange still tells
+//! a pitchfork from a fold.
+//!
 //! **Equations.** For a forced field with R x(t + δ), δ = 0 or half a period, as the image of x(t):
 //!
 //! ```text
@@ -13,7 +17,7 @@
 //! ```
 //!
 //! **Fails when** a model has more symmetries than [`MOST`], or so many candidates for which (2) holds that the search is
-//! cut short; some symmetries then remain unknown, and branches that they map onto each other are listed separately.
+//! cut short; some symmetries then remain unknown.
 
 use super::System;
 use crate::contract::{Batch, Parameters, VectorField};
@@ -57,6 +61,7 @@ impl System<'_> {
     pub fn find_symmetries(&mut self, parameters: &[f64]) {
         let n = self.field.dim();
         (self.symmetries, self.mirrors) = (vec![Symmetry::identity()], vec![[true, false]]);
+        self.exchanges = Vec::new();
         // Events need not be symmetric.
         if self.field.event_count() > 0 || n == 0 {
             return;
@@ -75,7 +80,10 @@ impl System<'_> {
                 }
             }
         }
-        let (symmetries, mirrors): (Vec<_>, Vec<_>) = found.into_iter().take(MOST).unzip();
+        let (exchanges, reflections): (Vec<_>, Vec<_>) =
+            found.into_iter().take(MOST).partition(|(symmetry, _)| symmetry.permutes());
+        self.exchanges = exchanges.into_iter().map(|(symmetry, _)| symmetry).collect();
+        let (symmetries, mirrors): (Vec<_>, Vec<_>) = reflections.into_iter().unzip();
         self.symmetries.extend(symmetries);
         self.mirrors.extend(mirrors);
     }

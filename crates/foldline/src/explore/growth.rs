@@ -210,6 +210,7 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
     let periods = system.field.periods().to_vec();
     Settings {
         symmetries: system.symmetries.clone(),
+        exchanges: system.exchanges.clone(),
         periods,
         max_points,
         kinks: system.field.switch_count() - system.field.event_count(),

@@ -411,16 +411,10 @@ pub(super) fn across(
         gap < 1e-6 * (1.0 + one.parameter().abs()) && apart < 30.0 * settings.tolerance
     };
     if let Ok(other) = step_off_from(problem, settings, u, vector, -1.0, &distances, &|_, _| true, improved)
-        && let Some(symmetry) = system.symmetries.iter().find(|r| !r.is_identity() && alike(&other, r))
+        && system.symmetries.iter().any(|r| !r.is_identity() && alike(&other, r))
     {
-        // The other half of the branch is the mirror image of this one. Of states that are exchanged the first is the
-        // larger one, so that the choice does not depend on rounding.
-        let differs =
-            |(a, b): &(&[f64; 2], &[f64; 2])| (a[1] - b[1]).abs() > settings.tolerance * a[1].abs().max(b[1].abs());
-        let swapped = symmetry.permutes()
-            && one.point.ranges.iter().zip(&other.point.ranges).find(differs).is_some_and(|(a, b)| a[1] < b[1]);
-        let first = if swapped { other } else { one };
-        return Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) });
+        // The other half of the branch is the mirror image of this one.
+        return Ok(Beginning::Edge { before: Vec::new(), first: one, joined: joined(at, free) });
     }
     Ok(Beginning::Inside(one))
 }

@@ -29,9 +29,11 @@ pub struct System<'a> {
     pub limits: Limits,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,
-    /// Symmetries of the field, the identity first; for a forced field also those
-    /// under which it is equivariant half a forcing period later.
+    /// Symmetries of the field that change signs only, the identity first; for a forced field also those under which it
+    /// is equivariant half a forcing period later. Solutions that they map onto each other are one.
     pub symmetries: Vec<Symmetry>,
+    /// Symmetries that permute states.
+    pub exchanges: Vec<Symmetry>,
     /// Quantities held along the branch that is followed, with the further free parameters.
     pub(super) holds: Option<&'a Holds>,
     /// Names of states and outputs, for messages.
@@ -60,6 +62,7 @@ impl<'a> System<'a> {
             limits: Limits::default(),
             whirl: None,
             symmetries: vec![Symmetry::identity()],
+            exchanges: Vec::new(),
             holds: None,
             channel_names: Vec::new(),
             unfolded: None,
@@ -107,6 +110,7 @@ impl<'a> System<'a> {
         });
         let Some(mut common) = systems.next() else { return measured };
         for other in systems {
+            common.exchanges.retain(|own| other.exchanges.contains(own));
             let kept: Vec<bool> = common.symmetries.iter().map(|own| other.symmetries.contains(own)).collect();
             common.symmetries.retain(|own| other.symmetries.contains(own));
             let mut kept = kept.into_iter();
