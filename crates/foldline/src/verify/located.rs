@@ -245,8 +245,9 @@ impl<'a> Located<'a> {
         None
     }
 
-    /// True if a state is clearly on the wrong side of a surface.
-    fn astray(&self, x: &[f64], time: f64, signs: &[f64]) -> bool {
+    /// True if a state is clearly on the wrong side of a surface. A leg begins on the surface of the event before it, up to
+    /// the error with which that was located; `begin` are the values of the switches there.
+    fn astray(&self, x: &[f64], time: f64, signs: &[f64], begin: &[f64]) -> bool {
         let (n, kinks) = (x.len(), self.kinks());
         let own_time = [time];
         let side = |s: usize| match s.checked_sub(kinks) {
@@ -260,7 +261,8 @@ impl<'a> Located<'a> {
         let [h, gradient, _, later] = self.setting.linearise_switches(self.batch(x, &own_time, &[]));
         (0..h.len()).any(|s| {
             let size = (0..n).map(|j| (gradient[s * n + j] * x[j]).abs()).sum::<f64>() + later[s].abs();
-            side(s) * h[s] < -ROUNDING * size && !self.ignores(Met::Surface(s), time)
+            let allowed = ROUNDING * size + 2.0 * (-side(s) * begin[s]).max(0.0);
+            side(s) * h[s] < -allowed && !self.ignores(Met::Surface(s), time)
         })
     }
 
@@ -314,6 +316,7 @@ impl<'a> Located<'a> {
         let integrator = Integrator::new(&field, &parameters, self.tolerance.clone())
             .with_step_limit(STEPS)
             .with_longest_step(longest);
+        let begin = self.switches(&state[..n], span[0]);
         let mut astray = None;
         let mut met: Option<(Met, f64, Vec<f64>)> = None;
         let mut steps: Vec<Kept> = Vec::new();
@@ -336,7 +339,7 @@ impl<'a> Located<'a> {
                 steps.push(([ends[0], end], sampled(step, n, share)));
                 let mut x = vec![0.0; n];
                 step.end_into(&mut x);
-                if met.is_none() && self.astray(&x, ends[1], signs) {
+                if met.is_none() && self.astray(&x, ends[1], signs, &begin) {
                     astray = Some((ends[1] - ends[0]) / SHORTER);
                 }
                 if met.is_some() || astray.is_some() { Verdict::Stop } else { Verdict::Continue }
