@@ -424,7 +424,9 @@ def hold(
     ends = check_range(range, f'foldline.hold(point, "{free}", {{}})', missing)
     own = name or f"{point.kind} of {branch.name} over {free}"
     options: dict[str, Any] = {"out": out, "jobs": jobs, "resume": resume, "progress": progress}
-    ranges = {key: check_range(pair, f'foldline.hold(point, "{free}", (0, 1), also={{"{key}": {{}}}})') for key, pair in (also or {}).items()}
+    ranges = {
+        key: check_range(pair, f'foldline.hold(point, "{free}", (0, 1), also={{"{key}": {{}}}})') for key, pair in (also or {}).items()
+    }
     curve = {"name": own, "hold": point.kind, "of": branch.name, "near": point.value, "free": free, "range": ends, "also": ranges or None,
              "branch-range": check_range(branch_range, f'foldline.hold(point, "{free}", (0, 1), branch_range={{}})'),
              "until": None if until is None else end("until", until), "max-points": whole("max_points", max_points)}  # fmt: skip

@@ -286,12 +286,12 @@ fn opened(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileEr
     }
 }
 
-/// Sets another tolerance. A coarser one means a quick look, for which surveys visit every 24th value with fewer
+/// Sets another tolerance. A coarser one means a quick look, for which surveys visit every twelfth value with fewer
 /// starts.
 fn quick(plan: &mut Plan, tolerance: f64) {
     if tolerance > plan.tolerance {
         for survey in &mut plan.surveys {
-            survey.values = survey.values.iter().copied().step_by(24).collect();
+            survey.values = survey.values.iter().copied().step_by(12).collect();
             survey.starts = survey.starts.div_ceil(4);
         }
     }

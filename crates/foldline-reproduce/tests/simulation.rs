@@ -38,7 +38,7 @@ fn simulated_motions_lie_on_branches_and_sweeps_jump_where_dl_ends() {
     assert!((numbers(claim(&made, "branch of DL doubles again"))[1] - 4.199325).abs() < 1e-4);
     let every = claim(&made, "Every motion");
     let found = numbers(every);
-    assert!(found[0] == found[1] && found[0] > 6.0, "{every:?}");
+    assert!(found[0] == found[1] && found[0] > 12.0, "{every:?}");
     for branch in ["contact S at", "contact SL at", "contact DL at", "contact 4:1 at"] {
         assert_eq!(claim(&made, branch).verdict, Verdict::Agrees, "{branch}");
     }

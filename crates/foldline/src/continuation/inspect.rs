@@ -54,8 +54,9 @@ const SYMMETRIC: f64 = 3e-3;
 /// Share of a step within which a linearly extrapolated monitor must change sign to be suspected of touching zero.
 const WELL: f64 = 0.75;
 
-/// Least share of a step that a cut where a monitor may touch zero leaves on either side.
-const BESIDE: f64 = 0.05;
+/// Number of parts of a step at whose ends it is cut where a monitor may touch zero: coarse enough for the cut not to depend
+/// on rounding.
+const PLACES: f64 = 16.0;
 
 /// Values of all monitors at the point before an interval, for the test for tangency.
 #[derive(Clone, Debug)]
@@ -720,7 +721,8 @@ impl Follow<'_> {
             let at = -slope / (2.0 * bend);
             let value = b + at * (slope + bend * at);
             if bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1 {
-                return Some(at.clamp(BESIDE * length, (1.0 - BESIDE) * length));
+                let place = (PLACES * at / length).round().clamp(1.0, PLACES - 1.0);
+                return Some(place * length / PLACES);
             }
             ((b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
         })

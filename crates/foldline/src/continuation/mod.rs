@@ -96,9 +96,10 @@ impl Settings {
         self.symmetries.iter().filter(|own| !own.is_identity()).chain(&self.exchanges)
     }
 
-    /// True if the model has a symmetry.
+    /// True if the model is symmetric under changes of sign. Whether it is under an exchange of states depends on their
+    /// units, and the steps must not.
     pub(crate) fn is_symmetric(&self) -> bool {
-        self.images().next().is_some()
+        self.symmetries.len() > 1
     }
 
     /// Settings for a tolerance and a parameter range.
