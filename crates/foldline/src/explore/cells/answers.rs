@@ -221,7 +221,7 @@ pub fn settled_at(system: &System, readings: &[(String, Reading)], point: &Point
 /// `notes` what was remarked.
 ///
 /// # Errors
-/// What fell short, if there are no branches.
+/// Reason why there are no branches.
 pub fn points(diagram: &Diagram, model: &Model, short: &[String], notes: &[String]) -> Result<CellAnswer, String> {
     let joined = |all: &mut dyn Iterator<Item = &String>| {
         let mut told: Vec<&str> = Vec::new();
