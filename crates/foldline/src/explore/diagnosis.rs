@@ -10,7 +10,7 @@ use crate::contract::{Batch, Parameters};
 use crate::diagram::{Ending, Point, Shown};
 use crate::linalg::max_abs;
 use crate::model::{conserved_at, in_words, shifts};
-use crate::problem::mesh::LARGEST;
+use crate::problem::mesh::largest;
 use crate::special::connection::in_first_turn;
 
 /// Size, relative to the largest, below which the remainder of a column is rounding.
@@ -78,9 +78,10 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
             angles.join(", ")
         ),
         _ if seen.repeats => format!(
-            "\nlikely cause: the cycle needs a mesh of more than {LARGEST} intervals, as a burst of a hundred spikes does; or it \
-             is one of a family, or hardly attracts\nwhat to do: set a larger tolerance, change the parameters so that \
-             the cycle becomes simpler and follow it from there, or follow the attractor by simulation with [[sweep]]"
+            "\nlikely cause: the cycle needs a mesh of more than {} intervals, as a burst of several hundred spikes \
+             does; or it is one of a family, or hardly attracts\nwhat to do: set a larger tolerance, change the parameters so that \
+             the cycle becomes simpler and follow it from there, or follow the attractor by simulation with [[sweep]]",
+            largest(system.field.dim(), 4)
         ),
         _ if seen.unsettled => {
             let rest = if system.field.switch_count() > 0 {

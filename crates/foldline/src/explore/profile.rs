@@ -2,7 +2,7 @@
 
 use crate::diagram::{Cycle, Point, Solution};
 use crate::problem::gauss::Scheme;
-use crate::problem::mesh::LARGEST;
+use crate::problem::mesh::largest;
 
 /// Samples per integration step of a trajectory that becomes a profile.
 pub(super) const PARTS: usize = 4;
@@ -32,12 +32,12 @@ pub(super) fn first_profile(
     /// sampling, 1e-6, by a factor of safety of a hundred.
     const LEAST: f64 = 1e-8;
     let n = scales.len();
+    let scheme = Scheme::new(4);
     // A cycle of many turns needs more intervals.
     let intervals = match spread {
         Spread::Arclength => (times.len() / 12).clamp(60, 1200),
-        Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
+        Spread::Steps => (times.len() / PARTS).clamp(60, largest(n, scheme.degree)),
     };
-    let scheme = Scheme::new(4);
     let size: Vec<f64> =
         (0..n).map(|i| states.iter().skip(i).step_by(n).fold(LEAST * scales[i], |m: f64, v| m.max(v.abs()))).collect();
     // Arclength in scaled states, plus time, so that no interval becomes empty.

@@ -11,12 +11,23 @@ use super::gauss::Scheme;
 use crate::diagram::{Cycle, Mesh};
 use crate::linalg::lane::{Eight, Lane as _};
 
-/// Largest permitted number of intervals.
+/// Number of intervals permitted for any number of states; see [`largest`].
 pub const LARGEST: usize = 4000;
+/// Number of intervals never exceeded: a burst of some hundred spikes, of thirty intervals each, takes half of it.
+const MOST: usize = 20_000;
+/// Memory, in bytes, of the matrices of the intervals within which more than [`LARGEST`] are permitted.
+const MEMORY: usize = 256 << 20;
 const SMALLEST: usize = 6;
 /// Ratio of the lengths of neighbouring intervals below which the shorter one is a sliver. Empirical: far below the
 /// grading of meshes that resolve a layer, so that they stay as they are.
 const SLIVER: f64 = 1e-3;
+
+/// Largest permitted number of intervals for n states and degree m. The matrix of an interval has n m rows and n (m + 1)
+/// columns.
+pub fn largest(n: usize, degree: usize) -> usize {
+    let matrix = size_of::<f64>() * n * degree * n * (degree + 1);
+    (MEMORY / matrix.max(1)).clamp(LARGEST, MOST)
+}
 
 /// Mesh of N equal intervals.
 pub fn uniform(intervals: usize) -> Mesh {
@@ -56,8 +67,14 @@ pub fn denser(mesh: &Mesh) -> Mesh {
 }
 
 /// Mesh on which every interval would have an error of about `target`, nowhere coarser than the share `kept` of the
-/// density of `mesh`. `None` if more than [`LARGEST`] intervals were needed.
-pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
+/// density of `mesh`. `None` if more than `most` intervals were needed.
+pub fn equidistributed(
+    errors: &[f64],
+    mesh: &Mesh,
+    (degree, most): (usize, usize),
+    target: f64,
+    kept: f64,
+) -> Option<Mesh> {
     let count = errors.len();
     let power = 1.0 / (degree as f64 + 1.0);
     let raw: Vec<f64> = (0..count).map(|j| (errors[j] / target).powf(power) / (mesh[j + 1] - mesh[j])).collect();
@@ -79,7 +96,7 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, 
         })
         .collect();
     let total: f64 = (0..count).map(|j| density[j] * (mesh[j + 1] - mesh[j])).sum();
-    if !(total.is_finite() && total <= LARGEST as f64) {
+    if !(total.is_finite() && total <= most as f64) {
         return None;
     }
     let wanted = (total.ceil() as usize).max(SMALLEST);
@@ -98,13 +115,20 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, 
     Some(out.into())
 }
 
-/// Equidistributed mesh whose second half is a copy of the first, as in `mesh`; see [`equidistributed`].
-pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
+/// Equidistributed mesh whose second half is a copy of the first, as in `mesh`, with `limits` for each half; see
+/// [`equidistributed`].
+pub fn equidistributed_in_halves(
+    errors: &[f64],
+    mesh: &Mesh,
+    limits: (usize, usize),
+    target: f64,
+    kept: f64,
+) -> Option<Mesh> {
     let half = errors.len() / 2;
     let worse: Vec<f64> = (0..half).map(|j| errors[j].max(errors[j + half])).collect();
     let stretched: Mesh = mesh[..=half].iter().map(|t| 2.0 * t).collect();
     // Lengths relative to the half are twice those relative to the whole; the errors do not change.
-    let first = equidistributed(&worse, &stretched, degree, target, kept)?;
+    let first = equidistributed(&worse, &stretched, limits, target, kept)?;
     Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
 }
 
@@ -289,7 +313,7 @@ mod tests {
         };
         let mut mesh = uniform(20);
         for _ in 0..8 {
-            mesh = equidistributed(&error(&mesh), &mesh, 4, 1e-3, 0.0).unwrap();
+            mesh = equidistributed(&error(&mesh), &mesh, (4, LARGEST), 1e-3, 0.0).unwrap();
         }
         let worst = error(&mesh).iter().fold(0.0, |m: f64, x| m.max(*x));
         assert!(worst < 2e-3, "{worst}");

@@ -95,6 +95,7 @@ fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
     /// Shortest interval, in periods: four digits above the rounding of a mesh boundary.
     const SHORTEST: f64 = 1e-12;
     let scheme = cycle.scheme();
+    let most = mesh::largest(cycle.dim(), cycle.degree);
     let state = |t: f64| {
         let mut x = vec![0.0; cycle.dim()];
         cycle.state_into(scheme, t, &mut x);
@@ -104,7 +105,7 @@ fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
     let mut open: Vec<Part> = cycle.mesh.windows(2).map(|pair| part([pair[0], pair[1]])).collect();
     let (mut done, mut allowed) = (vec![1.0], f64::NAN);
     while !open.is_empty() {
-        if open.len() + done.len() > mesh::LARGEST || open.iter().any(|part| part.ends[1] - part.ends[0] < SHORTEST) {
+        if open.len() + done.len() > most || open.iter().any(|part| part.ends[1] - part.ends[0] < SHORTEST) {
             return None;
         }
         let Missed { missed, changes, largest } = missed(setting, at, cycle, scheme, &open);

@@ -56,13 +56,14 @@ impl CycleProblem<'_> {
     /// Mesh for a tolerance at `u`, from the errors on the current one.
     pub(super) fn equidistributed(&self, u: &[f64], errors: &[f64], tolerance: f64, kept: f64) -> Option<Mesh> {
         let (degree, target) = (self.scheme.degree, TARGET * tolerance);
+        let limits = (degree, mesh::largest(self.n, degree));
         if self.halves {
-            mesh::equidistributed_in_halves(errors, &self.mesh, degree, target, kept)
+            mesh::equidistributed_in_halves(errors, &self.mesh, limits, target, kept)
         } else if !self.is_open() && self.nearly_doubled(u) {
             let (errors, halved) = mesh::halved(errors, &self.mesh, degree);
-            mesh::equidistributed_in_halves(&errors, &halved, degree, target, kept)
+            mesh::equidistributed_in_halves(&errors, &halved, limits, target, kept)
         } else {
-            mesh::equidistributed(errors, &self.mesh, degree, target, kept)
+            mesh::equidistributed(errors, &self.mesh, limits, target, kept)
         }
     }
 

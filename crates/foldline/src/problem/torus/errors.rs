@@ -124,7 +124,13 @@ impl TorusProblem<'_> {
             let late = known.time.iter().any(|e| *e > tolerance);
             let rough = known.tail() > tolerance;
             let time = match late {
-                true => mesh::equidistributed(&known.time, &self.time, self.scheme.degree, TARGET * tolerance, KEPT)?,
+                true => mesh::equidistributed(
+                    &known.time,
+                    &self.time,
+                    (self.scheme.degree, mesh::LARGEST),
+                    TARGET * tolerance,
+                    KEPT,
+                )?,
                 false => self.time.clone(),
             };
             let wanted = if rough { known.needed(TARGET * tolerance) } else { 0 };
@@ -139,12 +145,13 @@ impl TorusProblem<'_> {
         self.measured_at(u, |known| {
             let (degree, target) = (self.scheme.degree, TARGET * tolerance);
             let fits = known.time.iter().all(|e| *e <= tolerance) && known.tail() <= tolerance;
-            let enough = mesh::equidistributed(&known.time, &self.time, degree, target, 0.0).filter(|_| fits)?;
+            let enough = mesh::equidistributed(&known.time, &self.time, (degree, mesh::LARGEST), target, 0.0)
+                .filter(|_| fits)?;
             let own = self.phases / 2;
             let needed = known.needed(target).max(SMALLEST).max(3 * own / 4);
             let [shorter, smoother] = [2 * enough.len() < self.time.len(), 5 * needed < 4 * own];
             let time = match shorter {
-                true => mesh::equidistributed(&known.time, &self.time, degree, target, KEPT)?,
+                true => mesh::equidistributed(&known.time, &self.time, (degree, mesh::LARGEST), target, KEPT)?,
                 false => self.time.clone(),
             };
             let count = if smoother { 2 * needed + 1 } else { self.phases };
