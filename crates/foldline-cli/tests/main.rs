@@ -14,6 +14,7 @@ mod classical;
 mod coefficient_errors;
 mod connecting;
 mod contact;
+mod crossings;
 mod curves;
 mod design;
 mod ends;

@@ -288,6 +288,15 @@ pub struct Examination {
     pub trust: Trust,
 }
 
+/// A change of a solution, seen from points that move along time with its jumps.
+#[derive(Clone, Debug)]
+pub struct Shift {
+    /// `[N + 1]`: shift of every mesh boundary, in periods; linear in between.
+    pub times: Vec<f64>,
+    /// `[unknowns]`: change at the moving points.
+    pub shape: Vec<f64>,
+}
+
 /// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters divided by their scales; the
 /// very last is the continuation parameter. With k > 1 the solutions form a surface, and further conditions are needed
 /// to select a curve on it.
@@ -353,6 +362,12 @@ pub trait ZeroProblem {
             sum.iter_mut().zip(*own).for_each(|(sum, u)| *sum += weight * u);
         }
         sum
+    }
+
+    /// Splits a change of the solution `u` on the current mesh into a shift in time and a change of shape; `None` if the
+    /// problem does not support this.
+    fn shift(&self, _u: &[f64], _change: &[f64]) -> Option<Shift> {
+        None
     }
 
     /// Returns a mesh on which `u` would meet `tolerance`, or `None` if it does so on the current mesh. The last

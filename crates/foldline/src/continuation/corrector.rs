@@ -328,6 +328,9 @@ pub fn doubted(problem: &mut dyn ZeroProblem, found: &mut Station) {
     found.point.trust.spectrum = problem.spectrum_error(&found.u, &found.point.spectrum);
 }
 
+/// Largest stated error of a point, in tolerances: the stated error is four times the estimate.
+pub(super) const RESOLVED: f64 = 6.0;
+
 /// A multiplier within this many defects of the unit circle could be on its other side …
 const CERTAIN: f64 = 20.0;
 /// … and is recomputed with the tolerance multiplied by this factor.
@@ -417,10 +420,11 @@ pub fn refine(
         }
         let within = |distance: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < distance);
         let close = |defect: f64| within(CERTAIN * defect);
-        let certain = !(again && (close(defect) || within(found.point.trust.spectrum)));
+        // An error that could not be estimated may be a profile that is not resolved.
+        let unknown = found.point.trust.spectrum.is_nan() && problem.has_multipliers();
+        let certain = !(again && (close(defect) || within(found.point.trust.spectrum) || accurate && unknown));
         if accurate && certain {
-            // The stated error is four times the estimate.
-            if trust.discretisation > 6.0 * settings.tolerance {
+            if trust.discretisation > RESOLVED * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }
             if settings.stability && found.point.spectrum.iter().any(|z| z.re.is_nan()) {

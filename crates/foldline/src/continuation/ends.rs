@@ -25,7 +25,7 @@ const DIVISIBLE: f64 = 1e-3;
 #[derive(Clone, Debug, Default)]
 pub struct Homecoming {
     /// True once the run has left the start.
-    away: bool,
+    pub(super) away: bool,
     /// Largest distance from the start so far, for every image of it under a symmetry, and whether the distance has decreased
     /// since.
     reached: Vec<(f64, bool)>,
@@ -250,6 +250,7 @@ impl Follow<'_> {
                 right: near,
                 end: Some(Ending::Joined { at: monitor.kind(), parameter }),
                 between: None,
+                moving: None,
             }));
         }
         Ok(None)

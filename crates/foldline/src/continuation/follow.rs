@@ -10,7 +10,7 @@ use super::corrector::{Care, Failure, Station};
 use super::diagnosis::{Past, Tried};
 use super::ends::Homecoming;
 use super::inspect::Found;
-use super::step::Step;
+use super::step::{Step, Trail};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Connection, Cost, Ending, Kind, Point, STANDS, SpecialPoint};
 
@@ -130,18 +130,8 @@ pub fn follow(
         let (past, mut tried) = (Past { first_period, moved: stirred }, Tried::new());
         walk.sharpen(&mut left, step, &mut cost);
         let mut rigid = !walk.refresh(&mut left, step, &mut cost);
-        let history = trail.as_ref().map(|t| t.history.clone());
-        let (Step { mut right, end, between }, found) = loop {
-            let attempt = walk.attempt(&left, trail.as_ref(), step, rigid, &mut cost).and_then(|tried| {
-                let found = walk.inspect(&left, &tried.right, history.as_ref(), 0, &mut cost);
-                let believed = found.iter().all(|f| match f {
-                    Found::Special(s) => step <= walk.believed_at(s.kind),
-                    Found::Inserted(..) => true,
-                });
-                let nothing = found.iter().all(|f| matches!(f, Found::Inserted(..)));
-                let jumped = step > CROSSING && nothing && walk.may_jump([&left, &tried.right], history.as_ref(), step);
-                if believed && !jumped { Ok((tried, found)) } else { Err(Failure::Unexplained) }
-            });
+        let (Step { mut right, end, between, moving }, found) = loop {
+            let attempt = walk.advanced(&left, trail.as_ref(), (step, rigid), &mut cost);
             match attempt {
                 Ok((_, found))
                     if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) =>
@@ -212,7 +202,8 @@ pub fn follow(
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
         let factor = walk.settings.target_angle / (trend * angle).max(1e-12);
         let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
-        step = (length * factor).clamp(walk.shortest(), walk.settings.max_step);
+        let most = walk.settings.max_step / moving.as_ref().map_or(1.0, |moving| moving.rate);
+        step = (length * factor).clamp(walk.shortest(), most);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         let strange = walk.settings.stability && is_unexplained(&found);
         let spent = work(cost.factorisations, &right.mesh);
@@ -288,8 +279,62 @@ pub fn follow(
             (trail, before, left, step) = (None, None, right, walk.settings.first_step);
             continue;
         }
-        trail = Some(walk.trail(&left, between));
+        trail = Some(walk.trail(&left, between).moving(moving));
         before = Some(std::mem::replace(&mut left, right));
+    }
+}
+
+impl Follow<'_> {
+    /// Attempts a step, on a moving mesh if jumps of the solution move far, and inspects it.
+    fn advanced(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        (step, rigid): (f64, bool),
+        cost: &mut Cost,
+    ) -> Result<(Step, Vec<Found>), Failure> {
+        if let Some(done) = self.moved_on(left, trail, step, cost) {
+            return Ok(done);
+        }
+        let tried = self.attempt(left, trail, step, rigid, cost)?;
+        let found = self.examined_between(left, &tried.right, trail, step, cost)?;
+        Ok((tried, found))
+    }
+
+    /// A step on a moving mesh within which there is no special point.
+    fn moved_on(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        step: f64,
+        cost: &mut Cost,
+    ) -> Option<(Step, Vec<Found>)> {
+        let tried = self.moved(left, trail, step, cost)?.ok()?;
+        let found = self.examined_between(left, &tried.right, trail, step, cost).ok()?;
+        found.is_empty().then_some((tried, found))
+    }
+
+    /// Special points between both ends of a step.
+    ///
+    /// # Errors
+    /// [`Failure::Unexplained`] if the step is too long for what was found on it.
+    fn examined_between(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        trail: Option<&Trail>,
+        step: f64,
+        cost: &mut Cost,
+    ) -> Result<Vec<Found>, Failure> {
+        let history = trail.map(|trail| &trail.history);
+        let found = self.inspect(left, right, history, 0, cost);
+        let believed = found.iter().all(|f| match f {
+            Found::Special(s) => step <= self.believed_at(s.kind),
+            Found::Inserted(..) => true,
+        });
+        let nothing = found.iter().all(|f| matches!(f, Found::Inserted(..)));
+        let jumped = step > CROSSING && nothing && self.may_jump([left, right], history, step);
+        if believed && !jumped { Ok(found) } else { Err(Failure::Unexplained) }
     }
 }
 

@@ -183,6 +183,7 @@ impl Follow<'_> {
             if kind == Kind::Fold
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
+                && !self.passes_critical(left, right)
                 && found.as_ref().is_ok_and(|found| {
                     // In a symmetric model the symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
@@ -654,6 +655,7 @@ impl Follow<'_> {
         let count = if first && !cycles { PLACES.len() } else { 3 };
         let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
         let sight = self.monitors.iter().map(|monitor| monitor.reads()).max().unwrap_or(Sight::Tangent);
+        let mut known = vec![(0.0, at_left.to_vec()), (1.0, at_right.to_vec())];
         for (k, share) in PLACES[..count].iter().enumerate() {
             let s = share * stretch.length;
             let Ok(found) = stretch.seen_at(sight, self.problem, self.settings, s, cost) else { continue };
@@ -675,8 +677,33 @@ impl Follow<'_> {
                     return None;
                 }
             }
+            known.push((*share, here));
         }
-        None
+        if cycles {
+            return None;
+        }
+        // Two zeros may lie between neighbouring places.
+        known.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let length = stretch.length.abs();
+        let within = |[before, here, after]: [&(f64, Vec<f64>); 3]| {
+            let distance = length * (here.0 - before.0).abs();
+            let history =
+                History { distance, values: before.1.clone(), marks: Vec::new(), spectrum: Vec::new(), stands: false };
+            let place = self.touched(&history, &here.1, &after.1, length * (after.0 - here.0).abs())?;
+            Some(stretch.length * here.0 + (stretch.length * (after.0 - here.0)).signum() * place)
+        };
+        known.windows(3).find_map(|three| {
+            let [a, b, c] = [&three[0], &three[1], &three[2]];
+            within([a, b, c]).or_else(|| within([c, b, a]))
+        })
+    }
+
+    /// True if a real eigenvalue passes 0, or a real multiplier 1, between two stations: their numbers beyond differ.
+    fn passes_critical(&self, left: &Station, right: &Station) -> bool {
+        let centre = if is_cycle(left) { 1.0 } else { 0.0 };
+        let beyond =
+            |station: &Station| station.point.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > centre).count();
+        beyond(left) != beyond(right)
     }
 
     /// Computes a full station at distance s of the interval.
@@ -710,9 +737,13 @@ impl Follow<'_> {
     /// the parabola through the values is close to zero or beyond it, or the middle if the line through the first two
     /// changes sign well before the last. `None` if every monitor stays clear of zero.
     fn touched(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> Option<f64> {
+        // Where the branch turns, the determinant changes sign with the slope, which shows it better.
+        let keeps = |k: usize| history.values[k] * left[k] > 0.0 && left[k] * right[k] > 0.0;
+        let turns = || (0..left.len()).any(|k| self.monitors[k].kind() == Kind::Fold && !keeps(k));
         (0..left.len()).find_map(|k| {
             let (a, b, c) = (history.values[k], left[k], right[k]);
-            if self.monitors[k].kind() == Kind::BranchPoint || a * b <= 0.0 || b * c <= 0.0 {
+            let crossing = || self.monitors[k].kind() == Kind::BranchPoint;
+            if !keeps(k) || crossing() && (self.problem.has_multipliers() || turns()) {
                 return None;
             }
             let (before, after) = ((b - a) / history.distance, (c - b) / length);
@@ -724,7 +755,7 @@ impl Follow<'_> {
                 let place = (PLACES * at / length).round().clamp(1.0, PLACES - 1.0);
                 return Some(place * length / PLACES);
             }
-            ((b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
+            (!crossing() && (b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
         })
     }
 }

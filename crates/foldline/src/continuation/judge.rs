@@ -11,19 +11,19 @@ use super::step::{Aim, Between};
 use crate::diagram::Cost;
 
 /// Distance to singularity below which a step must also lead back to its start.
-const CROWDED: f64 = 0.02;
+pub(super) const CROWDED: f64 = 0.02;
 /// Largest miss, in tolerances, of a step that leads back; a larger one indicates another branch.
 const BACK: f64 = 100.0;
 /// Magnitude of the cusp test function below which its sign is rounding.
 const UNSIGNED: f64 = 1e-7;
 /// Largest distance of the point from its prediction, as a share of the step …
-const MISS: f64 = 0.3;
+pub(super) const MISS: f64 = 0.3;
 /// … and largest first Newton update, which may be revised by later ones.
-const FAR: f64 = 0.6;
+pub(super) const FAR: f64 = 0.6;
 /// Largest distance of the curve midway from the cubic between both ends of a step, as a share of the step …
 const OFF: f64 = 0.01;
 /// … and the limit for an estimate of it.
-const NEARLY_OFF: f64 = 0.02;
+pub(super) const NEARLY_OFF: f64 = 0.02;
 /// Limit for the estimate next to other branches: the two sides of a loop of the branch can be that close.
 const NEARLY_OFF_CROWDED: f64 = 0.003;
 /// Relative Newton update that indicates a singular matrix.
@@ -79,10 +79,15 @@ impl Follow<'_> {
         // The shorter of the two distances counts, so that a point far away does not pass for close in proportion.
         let ahead: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
         let step = self.problem.dot(&left.tangent, &ahead).min(length).max(f64::MIN_POSITIVE);
-        if angle > self.settings.max_angle || miss > MISS * step || bent > CHORD_FACTOR * angle + CHORD_SLACK {
+        if angle > self.settings.max_angle || miss > MISS * step || bent > self.chord_limit(angle) {
             return Err(Failure::Elsewhere { angle, miss: miss / step });
         }
         Ok(between)
+    }
+
+    /// Largest sum of the angles of the chord with both tangents, given the angle between these.
+    pub(super) fn chord_limit(&self, angle: f64) -> f64 {
+        CHORD_FACTOR * angle + CHORD_SLACK
     }
 
     /// Checks that the curve follows the cubic between both ends of a step. An oscillation shorter than the step is not

@@ -29,6 +29,7 @@ pub mod inspect;
 mod judge;
 pub mod locate;
 mod marks;
+mod moving;
 mod opposite;
 mod side;
 mod step;

@@ -4,9 +4,10 @@
 //! bound is moved to it. The corrected point is refined on its mesh, compared with the previous one, and checked for an
 //! end of the branch.
 
-use super::corrector::{Care, Failure, Station, refine};
+use super::corrector::{Care, Failure, RESOLVED, Station, refine};
 use super::follow::Follow;
 use super::inspect::History;
+use super::moving::Moving;
 use crate::diagram::{Cost, Ending, Mesh};
 
 /// An accepted step, which may be the last one.
@@ -15,6 +16,8 @@ pub(super) struct Step {
     pub(super) end: Option<Ending>,
     /// Relative position of its ends, if already known.
     pub(super) between: Option<Between>,
+    /// Data of a step on a moving mesh, for the next one.
+    pub(super) moving: Option<Moving>,
 }
 
 /// Relative position of two neighbouring points.
@@ -41,6 +44,16 @@ pub(super) struct Trail {
     /// Angle between their tangents per arclength.
     pub(super) curvature: f64,
     pub(super) history: History,
+    /// Set if the step to the current point was one on a moving mesh; `u` and `tangent` are then of no use to the
+    /// predictor.
+    pub(super) moving: Option<Moving>,
+}
+
+impl Trail {
+    /// This trail, after a step on a moving mesh.
+    pub(super) fn moving(self, moving: Option<Moving>) -> Trail {
+        Trail { moving, ..self }
+    }
 }
 
 /// The target of a step.
@@ -80,7 +93,15 @@ impl Follow<'_> {
         let history = History { distance, values, marks, spectrum, stands };
         let length = between.chord.max(distance) * (1.0 + between.angle * between.angle / 24.0);
         let (u, tangent) = (before.u.clone(), before.tangent.clone());
-        Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: between.angle / length, history }
+        Trail {
+            u,
+            tangent,
+            mesh: before.mesh.clone(),
+            length,
+            curvature: between.angle / length,
+            history,
+            moving: None,
+        }
     }
 
     /// Relative position of two stations, on the mesh and in the metric of the left one.
@@ -140,6 +161,7 @@ impl Follow<'_> {
         rigid: bool,
         cost: &mut Cost,
     ) -> Result<Step, Failure> {
+        let trail = trail.filter(|trail| trail.moving.is_none());
         let guess = self.predicted(left, trail, step);
         // A step that would pass a bound is aimed at it. If that fails, the bound is located after the step.
         if let Some((nearer, landing)) = self.landing(left, trail, &guess, step)
@@ -201,19 +223,29 @@ impl Follow<'_> {
         let step = aim.step();
         let (u, row) = self.corrected(left, guess, aim, cost)?;
         let short = self.is_short(&left.mesh, step);
-        let mut right = if rigid && short {
+        let mut on_its_mesh = None;
+        if rigid && short {
             let close = self.settings.closeness(&left.mesh, step);
-            self.unrefined(left, u, close, cost)?
-        } else {
-            let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
-            refine(self.problem, self.settings, care, row, u, self.direction, cost)?
+            let found = self.unrefined(left, u.clone(), close, cost)?;
+            // A mesh that no longer resolves the profile is worse than a change of mesh.
+            let coarse = found.point.trust.discretisation > RESOLVED * self.settings.tolerance;
+            on_its_mesh = Some(found).filter(|_| !coarse);
+        }
+        let forced = rigid && short && on_its_mesh.is_none();
+        let mut right = match on_its_mesh {
+            Some(found) => found,
+            None => {
+                self.place(left);
+                let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
+                refine(self.problem, self.settings, care, row, u, self.direction, cost)?
+            }
         };
         self.count(&mut right);
         if let Aim::Value(_) = aim {
             // For travel towards smaller values the parameter row has reversed the tangent.
             right.head(left.slope());
         }
-        if right.mesh != left.mesh && short {
+        if right.mesh != left.mesh && short && !forced {
             return Err(Failure::Remeshed(right.mesh));
         }
         let (mut miss, mut allowed) = (0.0, f64::INFINITY);
@@ -257,11 +289,11 @@ impl Follow<'_> {
             end = Some(Ending::Bound(bound));
         }
         if let Some((value, there)) = self.beyond(left, &right, cost) {
-            return Ok(Step { right: there, end: Some(Ending::Bound(value)), between: None });
+            return Ok(Step { right: there, end: Some(Ending::Bound(value)), between: None, moving: None });
         }
         if let Some(home) = self.closes(left, &right, cost)? {
-            return Ok(Step { right: home, end: Some(Ending::Closed), between: None });
+            return Ok(Step { right: home, end: Some(Ending::Closed), between: None, moving: None });
         }
-        Ok(Step { right, end, between })
+        Ok(Step { right, end, between, moving: None })
     }
 }

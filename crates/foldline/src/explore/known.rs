@@ -11,7 +11,7 @@ use super::growth::{Line, polished, problem_of, revived};
 use super::minimal::reduced;
 use crate::continuation::Settings;
 use crate::continuation::locate::{Stretch, passing};
-use crate::contract::Observer;
+use crate::contract::{Observer, ZeroProblem};
 use crate::diagram::{Branch, Cost, Kind, Point, Solution};
 
 /// Returns every solution on a branch at a value of its parameter, by increasing position: one for each time that the
@@ -136,6 +136,39 @@ pub(super) fn lasting(point: &Point, times: f64) -> Point {
     other
 }
 
+/// Factor by which the tangent between two points of a branch may turn beyond the angle of the tangents at these points …
+const TURN: f64 = 2.0;
+/// … and slack on top, in radians: what the tangent of a straight branch turns by errors, with a wide margin.
+const SLACK: f64 = 0.05;
+
+/// True if the parameter changes equally fast along the branches of two solutions that may be the same, in any phase and
+/// under any symmetry. Next to a pitchfork solutions of both branches differ little in their ranges.
+fn slopes_agree(a: &Point, b: &Point) -> bool {
+    let known = |point: &Point| !point.tangent.is_empty();
+    !(known(a) && known(b)) || (a.parameter_slope().abs() - b.parameter_slope().abs()).abs() <= APART
+}
+
+/// Difference of the slopes of the parameter beyond which two solutions lie on different branches: that of directions
+/// which differ by a twentieth of a right angle.
+const APART: f64 = 0.08;
+
+/// Angle between the tangents of two points of a branch; `None` if one of them has no tangent, or unknowns of another kind.
+fn turn(problem: &mut dyn ZeroProblem, from: &Point, to: &Point) -> Option<f64> {
+    let (mesh, there) = (from.solution.mesh(), to.solution.mesh());
+    if from.tangent.is_empty() || to.tangent.is_empty() || mesh.is_empty() != there.is_empty() {
+        return None;
+    }
+    problem.set_mesh(&there);
+    let u = problem.unknowns_of(to);
+    let along = if mesh.is_empty() { from.tangent.clone() } else { problem.transfer(&from.tangent, &mesh, &there) };
+    if along.len() != to.tangent.len() || along.len() != u.len() {
+        return None;
+    }
+    problem.anchor(&u);
+    let lengths = (problem.dot(&along, &along) * problem.dot(&to.tangent, &to.tangent)).sqrt();
+    Some((problem.dot(&along, &to.tangent) / lengths).abs().min(1.0).acos())
+}
+
 /// Difference of two solutions, in tolerances, within which they are the same: each has an error of a few on its own mesh.
 pub(super) const WITHIN: f64 = 30.0;
 
@@ -172,19 +205,27 @@ pub fn branch_of<'b>(
                 true => observer.recall(branch, point.position),
                 false => Some(point.clone()),
             };
-            let Some(mut guess) = whole(nearest).filter(|point| !point.is_light()) else { return false };
+            let [Some(left), Some(right)] = [whole(pair[0]), whole(pair[1])] else { return false };
+            let mut guess = if first { left.clone() } else { right.clone() };
+            if guess.is_light() {
+                return false;
+            }
             let mut problem = problem_of(system, free, degree, &guess, false);
+            let most = TURN * turn(&mut *problem, &left, &right).unwrap_or(0.0) + SLACK;
             guess.parameters[free] = value;
-            let same = |found: &Point| {
+            // Next to a crossing, Newton's method may go to the other branch.
+            let same = |problem: &mut dyn ZeroProblem, found: &Point| {
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
                 close(once.as_ref().unwrap_or(found), WITHIN * settings.tolerance)
+                    && turn(problem, &guess, found).is_none_or(|own| own <= most)
+                    && (turns > 1.0 || slopes_agree(point, found))
             };
-            if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
+            let near = polished(&mut *problem, settings, &guess);
+            if near.is_ok_and(|found| same(&mut *problem, &found.point)) {
                 return true;
             }
-            // Close to a crossing, Newton's method may have gone to the other branch.
-            let [Some(left), Some(right)] = [whole(pair[0]), whole(pair[1])] else { return false };
-            between(system, settings, branch, [&left, &right], value).is_some_and(|found| same(&found))
+            let found = between(system, settings, branch, [&left, &right], value);
+            found.is_some_and(|found| same(&mut *problem, &found))
         })
     });
     found.map(|branch| branch.name.as_str())

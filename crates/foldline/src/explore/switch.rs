@@ -21,6 +21,10 @@ use std::f64::consts::TAU;
 /// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
 pub const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 
+/// Distance of the first point of a branch, in distances of its plane, beyond which it belongs to another branch: it lies
+/// at an angle of more than 84° to the direction in which it was sought.
+const FAR: f64 = 10.0;
+
 /// [`DISTANCES`], beginning with those at which the branches differ by more than the tolerance.
 fn distances(tolerance: f64) -> Vec<f64> {
     let least = 2.0 * known::WITHIN * tolerance;
@@ -111,7 +115,15 @@ pub(super) fn step_off_from(
         let mut guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
         improved(problem, &mut guess);
         let plane = Plane { row: row.clone(), base: base.to_vec(), distance };
-        let tried = first_point(problem, settings, plane, guess).map(|mut found| {
+        let tried = first_point(problem, settings, plane, guess).and_then(|found| {
+            let here = problem.mesh();
+            let mut chord = problem.carry(&found.u, &found.mesh, &here);
+            chord.iter_mut().zip(problem.carry(base, &mesh, &here)).for_each(|(a, b)| *a -= b);
+            let miss = problem.dot(&chord, &chord).sqrt() / distance;
+            // Newton's method has gone far away.
+            if miss > FAR { Err(Failure::Elsewhere { angle: 0.0, miss }) } else { Ok(found) }
+        });
+        let tried = tried.map(|mut found| {
             // The branch has turned by this angle so far, and is expected to keep turning at this rate.
             let begun = problem.transfer(&row, &mesh, &found.mesh);
             let length = problem.dot(&begun, &begun).sqrt() * problem.dot(&found.tangent, &found.tangent).sqrt();

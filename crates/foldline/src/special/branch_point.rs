@@ -132,17 +132,28 @@ pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimensi
     })
 }
 
+/// Share of the square of a vector that must be left without its component along the parameter, for the next iteration to
+/// start from it.
+const LEFT: f64 = 1e-2;
+
 /// The vectors of [`kernel`], from the last factorisation.
 fn null_vectors(problem: &mut dyn ZeroProblem, tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {
     let size = problem.unknowns();
-    let start = |j: usize| (0..size).map(|k| ((k * k) as f64 * (0.37 + 0.11 * j as f64) + 0.2).sin()).collect();
+    let start =
+        |j: usize| -> Vec<f64> { (0..size).map(|k| ((k * k) as f64 * (0.37 + 0.11 * j as f64) + 0.2).sin()).collect() };
     let mut vectors: Vec<Vec<f64>> = (0..dimension).map(start).collect();
     let mut next = vec![0.0; size];
     for _ in 0..4 {
         for j in 0..dimension {
             let (done, rest) = vectors.split_at_mut(j);
             let v = &mut rest[0];
+            let whole = problem.dot(v, v);
             v[size - 1] = 0.0;
+            // Nothing is left of a null vector in the direction of the parameter alone.
+            if problem.dot(v, v) < LEFT * whole {
+                *v = start(j);
+                v[size - 1] = 0.0;
+            }
             problem.solve(v, &mut next);
             if !orthonormalised(problem, &mut next, done, 0.0) {
                 return None;

@@ -22,10 +22,10 @@
 //!
 //! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
-use super::normal_form::Local;
+use super::normal_form::{Local, units};
 use super::{cycle_form, fold, map_form};
 use crate::contract::{Monitor, VectorField};
-use crate::diagram::{Ending, Family, Kind, Point};
+use crate::diagram::{Ending, Family, Kind, Point, Solution};
 use crate::linalg::dot;
 use crate::problem::Setting;
 use num_complex::Complex64;
@@ -36,6 +36,10 @@ const VANISHING: f64 = 1e-9;
 
 /// |⟨p, q⟩| of unit vectors below which an eigenvalue 0 counts as double, given the accuracy of located points.
 const DOUBLE: f64 = 1e-6;
+
+/// Frequency, in rates of change near the equilibrium, below which a Hopf point has no first Lyapunov coefficient: the
+/// rounding error of the coefficient grows with the inverse square of the frequency, to 2e-4 at this one.
+const STILL: f64 = 1e-6;
 
 /// Test function in one line of the table.
 pub struct CodimensionTwo<'a> {
@@ -78,10 +82,22 @@ pub fn monitors<'a>(
 }
 
 impl CodimensionTwo<'_> {
-    /// Null vectors at a point, oriented like those at `reference`.
+    /// Units that suit the states near an equilibrium, and the largest rate of change there.
+    fn units(&self, at: &Point) -> Option<(Vec<f64>, f64)> {
+        let Solution::Equilibrium(state) = &at.solution else { return None };
+        let sizes: Vec<f64> = state.iter().zip(self.scales).map(|(x, s)| x.abs() + s).collect();
+        Some(units(self.field, state, &at.parameters, &sizes))
+    }
+
+    /// Equilibrium in units that suit `reference`.
+    fn local<'p>(&'p self, reference: &Point, at: &'p Point) -> Option<Local<'p>> {
+        Some(Local::new(self.field, at)?.in_units(&self.units(reference)?.0))
+    }
+
+    /// Null vectors at a point, oriented like those at `reference` and in units that suit it.
     fn oriented(&self, reference: &Point, at: &Point) -> Option<[Vec<f64>; 2]> {
-        let before = Local::new(self.field, reference)?.null_vectors()?;
-        Local::new(self.field, at)?.null_vectors_near(&before)
+        let before = self.local(reference, reference)?.null_vectors()?;
+        self.local(reference, at)?.null_vectors_near(&before)
     }
 
     /// Critical part of the spectrum, then the rest.
@@ -120,17 +136,23 @@ impl CodimensionTwo<'_> {
                 {
                     return None;
                 }
-                Local::new(self.field, at)?.quadratic(&self.oriented(reference, at)?)
+                self.local(reference, at)?.quadratic(&self.oriented(reference, at)?)
             }
             Kind::BogdanovTakens if self.held != Kind::Hopf => {
                 let [q, p] = self.oriented(reference, at)?;
                 let own = dot(&p, &q);
                 // In a conservative system the eigenvalue 0 is double all along the curve.
-                let [q, p] = Local::new(self.field, reference)?.null_vectors()?;
+                let [q, p] = self.local(reference, reference)?.null_vectors()?;
                 if own.abs().max(dot(&p, &q).abs()) < DOUBLE { DOUBLE } else { own }
             }
             Kind::BogdanovTakens => (held.first()? * held.get(1)?).re,
-            Kind::GeneralisedHopf => Local::new(self.field, at)?.hopf(held.first()?.im.abs())?,
+            Kind::GeneralisedHopf => {
+                let omega = held.first()?.im.abs();
+                if omega <= STILL * self.units(at)?.1 {
+                    return None;
+                }
+                Local::new(self.field, at)?.hopf(omega)?
+            }
             Kind::ZeroHopf if self.held == Kind::Hopf => rest.iter().product::<Complex64>().re,
             Kind::GeneralisedPeriodDoubling | Kind::Chenciner => self.coefficient(at)?,
             Kind::Resonance11 | Kind::Resonance12 if self.held == Kind::Torus => {
@@ -164,12 +186,8 @@ impl CodimensionTwo<'_> {
     /// True if the eigenvalue 0 of an equilibrium is simple. ⟨p, B(q, q)⟩ also vanishes, with ⟨p, q⟩, where a fold and
     /// a branch point meet at a double eigenvalue 0.
     fn is_simple(&self, at: &Point) -> Option<bool> {
-        let [q, p] = Local::new(self.field, at)?.null_vectors()?;
-        // Norm in scaled components.
-        let norm = |v: &[f64], power: i32| {
-            v.iter().zip(self.scales).map(|(v, s)| (v * s.powi(power)).powi(2)).sum::<f64>().sqrt()
-        };
-        Some(dot(&p, &q).abs() > DOUBLE * norm(&q, -1) * norm(&p, 1))
+        let [q, p] = self.local(at, at)?.null_vectors()?;
+        Some(dot(&p, &q).abs() > DOUBLE)
     }
 }
 

@@ -7,6 +7,7 @@
 //!
 //! **Source.** kuznetsov2004, §10.2 and §10.3.
 
+use super::normal_form;
 use crate::contract::{Batch, Parameters};
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Kind, Mesh, Point, Solution};
@@ -182,6 +183,28 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
     None
 }
 
+/// Null vector `[2n]` of the real form of A - iω, of largest component 1, by inverse iteration; `matrix` is `[2n × 2n]`.
+/// `None` if the iteration does not converge.
+fn null_vector(matrix: &[f64], size: usize) -> Option<Vec<f64>> {
+    let size_of = max_abs(matrix);
+    normal_form::SHIFTS.into_iter().find_map(|shift| {
+        let mut shifted = matrix.to_vec();
+        (0..size).for_each(|i| shifted[i * size + i] += shift * size_of);
+        let mut pivots = vec![0; size];
+        lu::factorise(&mut shifted, size, &mut pivots).ok()?;
+        let mut q: Vec<f64> = (0..size).map(|k| (1.0 + k as f64).sin()).collect();
+        let mut overlap = 0.0;
+        for _ in 0..4 {
+            let before = q.clone();
+            lu::solve(&shifted, size, &pivots, &mut q, 1);
+            overlap = normal_form::overlap(&before, &q);
+            let norm = max_abs(&q);
+            q.iter_mut().for_each(|v| *v /= norm);
+        }
+        (overlap > normal_form::ALIGNED).then_some(q)
+    })
+}
+
 /// Direction of the cycles that bifurcate at a Hopf point with frequency ω: the profile `[N(m+1)n]` of Re(q e^{2πit})
 /// with max |q_i|/s_i = 1, and the period 2π/ω. `None` if there is no such eigenvector.
 pub fn direction(
@@ -214,19 +237,7 @@ pub fn direction(
         matrix[i * size + n + i] = omega;
         matrix[(n + i) * size + i] = -omega;
     }
-    let size_of = max_abs(&matrix);
-    (0..size).for_each(|i| matrix[i * size + i] += 1e-14 * size_of);
-    let mut pivots = vec![0; size];
-    lu::factorise(&mut matrix, size, &mut pivots).ok()?;
-    let mut q: Vec<f64> = (0..size).map(|k| (1.0 + k as f64).sin()).collect();
-    for _ in 0..4 {
-        lu::solve(&matrix, size, &pivots, &mut q, 1);
-        let norm = max_abs(&q);
-        if !(norm.is_finite() && norm > 0.0) {
-            return None;
-        }
-        q.iter_mut().for_each(|v| *v /= norm);
-    }
+    let q = null_vector(&matrix, size)?;
     let mut profile = Vec::with_capacity((mesh.len() - 1) * (scheme.degree + 1) * n);
     for pair in mesh.windows(2) {
         for c in &scheme.nodes {

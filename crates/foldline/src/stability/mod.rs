@@ -29,7 +29,7 @@ pub fn eigenvalues(fx: &[f64], n: usize, scales: &[f64]) -> Vec<Complex64> {
 /// Sets of states that act on each other, directly or through others. In an order of these sets the matrix `[n × n]` is
 /// block triangular, so that its eigenvalues are those of the blocks, and those of slow states keep their digits beside
 /// fast states that follow them.
-fn blocks(a: &[f64], n: usize) -> Vec<Vec<usize>> {
+pub fn blocks(a: &[f64], n: usize) -> Vec<Vec<usize>> {
     let mut reaches: Vec<bool> = (0..n * n).map(|k| a[k] != 0.0 || k % n == k / n).collect();
     for via in 0..n {
         for i in (0..n).filter(|i| *i != via) {

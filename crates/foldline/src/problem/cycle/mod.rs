@@ -39,6 +39,7 @@ mod open;
 mod phase;
 mod residual;
 mod segment;
+mod shift;
 mod stages;
 #[cfg(test)]
 mod tests_local;
@@ -48,7 +49,7 @@ use super::gauss::Scheme;
 use super::mesh::Passage;
 use super::piecewise::{self, Obstacle, PiecewiseFlow, Switched};
 use super::{Setting, averages, extremes, mesh};
-use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
+use crate::contract::{Batch, Examination, Parameters, Shift, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Symmetry, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
@@ -730,6 +731,10 @@ impl ZeroProblem for CycleProblem<'_> {
         weights.iter().zip(solutions).for_each(|(weight, own)| axpy(*weight, own, &mut u));
         self.continue_through(solutions, &mut u);
         u
+    }
+
+    fn shift(&self, u: &[f64], change: &[f64]) -> Option<Shift> {
+        self.split(u, change)
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {

@@ -36,7 +36,7 @@ pub(super) struct Uncertain<'s, 'f> {
     pub(super) error: f64,
     rounding: f64,
     /// `[n]` sizes of the states.
-    sizes: Vec<f64>,
+    pub(super) sizes: Vec<f64>,
     /// Points displaced by the error bound times `larger`.
     others: Vec<Point>,
     larger: f64,
@@ -96,11 +96,25 @@ impl<'s, 'f> Uncertain<'s, 'f> {
 
     /// Values of a formula with their errors; `None` if the formula has no value at the point.
     pub(super) fn measured(&self, formula: &dyn Fn(&Sample) -> Option<Vec<f64>>) -> Option<Coefficients> {
+        self.sampled(&|local| local.with_sizes(&self.sizes), &self.sizes, formula)
+    }
+
+    /// As [`Uncertain::measured`], with the states of the samples measured by their sizes.
+    pub(super) fn measured_in_sizes(&self, formula: &dyn Fn(&Sample) -> Option<Vec<f64>>) -> Option<Coefficients> {
+        self.sampled(&|local| local.in_units(&self.sizes), &vec![1.0; self.sizes.len()], formula)
+    }
+
+    fn sampled<'x>(
+        &'x self,
+        prepared: &dyn Fn(Local<'x>) -> Local<'x>,
+        sizes: &[f64],
+        formula: &dyn Fn(&Sample) -> Option<Vec<f64>>,
+    ) -> Option<Coefficients> {
         let field = self.setting.field;
-        let values = formula(&Sample { local: Local::new(field, self.at)?, point: self.at })?;
+        let values = formula(&Sample { local: prepared(Local::new(field, self.at)?), point: self.at })?;
         let mut errors = vec![0.0f64; values.len()];
         for (seed, point) in (1..).zip(&self.others) {
-            let local = Local::new(field, point)?.shaken(self.rounding * self.larger, &self.sizes, seed);
+            let local = prepared(Local::new(field, point)?).shaken(self.rounding * self.larger, sizes, seed);
             // If the formula fails for so small a displacement, the error is infinite.
             let other = formula(&Sample { local, point }).unwrap_or_else(|| vec![f64::NAN; values.len()]);
             for (error, (value, other)) in errors.iter_mut().zip(values.iter().zip(&other)) {

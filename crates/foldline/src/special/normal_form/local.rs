@@ -6,6 +6,22 @@ use crate::linalg::{dot, lu, max_abs};
 use num_complex::Complex64;
 use std::cell::RefCell;
 
+/// Shifts off an eigenvalue in inverse iteration, relative to the matrix: above rounding, so that the shifted matrix is
+/// regular, and several of them, since one may be unfortunate.
+pub const SHIFTS: [f64; 3] = [1e-14, 3.7e-14, 1.3e-13];
+/// Overlap of two iterates from which they are the same vector: each iteration multiplies errors by the ratio of two distances
+/// from the shift, far below this.
+pub const ALIGNED: f64 = 1.0 - 1e-6;
+
+/// |⟨a, b⟩| of two complex vectors, divided by their lengths; real parts come first, then imaginary parts.
+pub fn overlap(a: &[f64], b: &[f64]) -> f64 {
+    let half = a.len() / 2;
+    let ((ar, ai), (br, bi)) = (a.split_at(half), b.split_at(half));
+    let (re, im) = (dot(ar, br) + dot(ai, bi), dot(ar, bi) - dot(ai, br));
+    // Divided one after the other, since the product can overflow.
+    re.hypot(im) / dot(a, a).sqrt() / dot(b, b).sqrt()
+}
+
 /// Equilibrium and the derivatives of f there.
 pub struct Local<'a> {
     field: &'a dyn VectorField,
@@ -14,6 +30,10 @@ pub struct Local<'a> {
     pub(super) n: usize,
     /// `[n × n]`.
     jacobian: Vec<f64>,
+    /// `[n]` units in which the states are measured; empty for those of the model.
+    units: Vec<f64>,
+    /// `[n]` sizes of the states, in terms of which null vectors are computed; empty if they are 1.
+    sizes: Vec<f64>,
     noise: Option<Noise>,
 }
 
@@ -56,7 +76,30 @@ impl<'a> Local<'a> {
         let batch =
             Batch { lanes: 1, states: state, parameters: Parameters::Shared(&at.parameters), times: &[], signs: &[] };
         field.linearise(batch, &[], &mut f, &mut jacobian, &mut []);
-        Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
+        Some(Local {
+            field,
+            state,
+            parameters: &at.parameters,
+            n,
+            jacobian,
+            units: Vec::new(),
+            sizes: Vec::new(),
+            noise: None,
+        })
+    }
+
+    /// The same equilibrium with the states measured in `units` `[n]`.
+    pub fn in_units(mut self, units: &[f64]) -> Local<'a> {
+        let n = self.n;
+        (0..n * n).for_each(|k| self.jacobian[k] *= units[k % n] / units[k / n]);
+        self.units = units.to_vec();
+        self
+    }
+
+    /// The same equilibrium with null vectors computed for states of `sizes` `[n]`.
+    pub(super) fn with_sizes(mut self, sizes: &[f64]) -> Local<'a> {
+        self.sizes = sizes.to_vec();
+        self
     }
 
     /// Perturbs the Jacobian and all higher derivatives with random signs. `size` is relative to the largest term of
@@ -74,14 +117,23 @@ impl<'a> Local<'a> {
     pub(super) fn transposed(&self) -> Local<'a> {
         let n = self.n;
         let jacobian = (0..n * n).map(|k| self.jacobian[k % n * n + k / n]).collect();
-        Local { jacobian, noise: self.noise.clone(), ..*self }
+        Local {
+            jacobian,
+            units: self.units.clone(),
+            sizes: self.sizes.iter().map(|size| 1.0 / size).collect(),
+            noise: self.noise.clone(),
+            ..*self
+        }
     }
 
     /// Derivative of f along directions in the states `[n]`, or in states and parameters `[n + k]`.
     pub(super) fn derivative(&self, along: &[&[f64]]) -> Vec<f64> {
         let size = self.n + self.parameters.len();
-        let full: Vec<Vec<f64>> =
+        let mut full: Vec<Vec<f64>> =
             along.iter().map(|d| d.iter().copied().chain(std::iter::repeat(0.0)).take(size).collect()).collect();
+        for own in &mut full {
+            own.iter_mut().zip(&self.units).for_each(|(d, unit)| *d *= unit);
+        }
         let full: Vec<&[f64]> = full.iter().map(Vec::as_slice).collect();
         let at = Batch {
             lanes: 1,
@@ -92,6 +144,7 @@ impl<'a> Local<'a> {
         };
         let mut out = vec![0.0; self.n];
         self.field.directional(at, &full, &mut out);
+        out.iter_mut().zip(&self.units).for_each(|(f, unit)| *f /= unit);
         if let Some(noise) = &self.noise {
             let largest = |d: &&[f64]| d.iter().zip(&noise.scales).fold(0.0f64, |most, (d, s)| most.max((d / s).abs()));
             let reach = along.iter().map(largest).product::<f64>();
@@ -146,24 +199,32 @@ impl<'a> Local<'a> {
 
     /// Right and left eigenvectors of the eigenvalue closest to z, with |q| = 1 and ⟨p, q⟩ = 1: A q = z q, pᴴ A = z pᴴ.
     pub(super) fn eigenvectors(&self, z: Complex64) -> Option<[Vec<Complex64>; 2]> {
-        // A shift of the order of rounding keeps the matrix regular at an eigenvalue.
-        let shift = 1e-14 * crate::linalg::size_in_any_units(&self.jacobian, self.n).max(z.norm());
-        let factors = self.shifted(z + shift, &[], &[])?;
-        let mut out = [const { Vec::new() }; 2];
-        for (side, vector) in out.iter_mut().enumerate() {
-            *vector = (0..2 * self.n).map(|k| (1.0 + k as f64).sin()).collect();
-            for _ in 0..3 {
-                match side {
-                    0 => lu::solve(&factors.matrix, 2 * self.n, &factors.pivots, vector, 1),
-                    _ => lu::solve_transposed(&factors.matrix, 2 * self.n, &factors.pivots, vector),
+        let size_of = crate::linalg::size_in_any_units(&self.jacobian, self.n).max(z.norm());
+        let out = SHIFTS.into_iter().find_map(|shift| {
+            let factors = self.shifted(z + shift * size_of, &[], &[])?;
+            let mut out = [const { Vec::new() }; 2];
+            for (side, vector) in out.iter_mut().enumerate() {
+                *vector = (0..2 * self.n).map(|k| (1.0 + k as f64).sin()).collect();
+                let mut aligned = 0.0;
+                for _ in 0..3 {
+                    let before = vector.clone();
+                    match side {
+                        0 => lu::solve(&factors.matrix, 2 * self.n, &factors.pivots, vector, 1),
+                        _ => lu::solve_transposed(&factors.matrix, 2 * self.n, &factors.pivots, vector),
+                    }
+                    aligned = overlap(&before, vector);
+                    let norm = dot(vector, vector).sqrt();
+                    if !(norm.is_finite() && norm > 0.0) {
+                        return None;
+                    }
+                    vector.iter_mut().for_each(|x| *x /= norm);
                 }
-                let norm = dot(vector, vector).sqrt();
-                if !(norm.is_finite() && norm > 0.0) {
+                if aligned.is_nan() || aligned < ALIGNED {
                     return None;
                 }
-                vector.iter_mut().for_each(|x| *x /= norm);
             }
-        }
+            Some(out)
+        })?;
         let [q, mut p] = out.map(|both| complex(&both));
         let size = hermitian(&p, &q).conj();
         p.iter_mut().for_each(|p| *p /= size);
@@ -177,41 +238,32 @@ impl<'a> Local<'a> {
         (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))
     }
 
-    /// Factors of A bordered by the column p and the row q.
-    fn with_borders(&self, q: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
-        let (n, size) = (self.n, self.n + 1);
-        let mut matrix = vec![0.0; size * size];
-        for i in 0..n {
-            matrix[i * size..i * size + n].copy_from_slice(&self.jacobian[i * n..(i + 1) * n]);
-            (matrix[i * size + n], matrix[n * size + i]) = (p[i], q[i]);
-        }
-        let mut pivots = vec![0; size];
-        lu::factorise(&mut matrix, size, &mut pivots).ok()?;
-        Some((matrix, pivots))
-    }
-
     /// Null vectors computed from approximate ones by a bordered system that is regular even at a double eigenvalue 0.
     /// They depend smoothly on the point and keep their orientation.
     pub fn null_vectors_near(&self, [q, p]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
         let (n, size) = (self.n, self.n + 1);
-        let (matrix, pivots) = self.with_borders(q, p)?;
-        let (mut v, mut w) = (vec![0.0; size], vec![0.0; size]);
-        (v[n], w[n]) = (1.0, 1.0);
-        lu::solve(&matrix, size, &pivots, &mut v, 1);
-        lu::solve_transposed(&matrix, size, &pivots, &mut w);
-        let unit = |mut x: Vec<f64>| {
+        let own = |i: usize| self.sizes.get(i).copied().unwrap_or(1.0);
+        let unit = |mut x: Vec<f64>, factor: &dyn Fn(usize) -> f64| {
             x.truncate(n);
+            x.iter_mut().enumerate().for_each(|(i, x)| *x *= factor(i));
             let norm = dot(&x, &x).sqrt();
             x.iter_mut().for_each(|x| *x /= norm);
             x
         };
-        Some([unit(v), unit(w)])
+        let (in_sizes, of_rows) = (|i: usize| 1.0 / own(i), |i: usize| own(i));
+        let jacobian: Vec<f64> = (0..n * n).map(|k| self.jacobian[k] * own(k % n) / own(k / n)).collect();
+        let (matrix, pivots) = with_borders(&jacobian, &unit(q.clone(), &in_sizes), &unit(p.clone(), &of_rows))?;
+        let (mut v, mut w) = (vec![0.0; size], vec![0.0; size]);
+        (v[n], w[n]) = (1.0, 1.0);
+        lu::solve(&matrix, size, &pivots, &mut v, 1);
+        lu::solve_transposed(&matrix, size, &pivots, &mut w);
+        Some([unit(v, &of_rows), unit(w, &in_sizes)])
     }
 
     /// Solves A y = r with ⟨q, y⟩ = 0 if that is solvable, for q and p from [`Local::null_vectors`].
     pub(super) fn bordered(&self, [q, p]: &[Vec<f64>; 2], r: &[f64]) -> Option<Vec<f64>> {
         let (n, size) = (self.n, self.n + 1);
-        let (matrix, pivots) = self.with_borders(q, p)?;
+        let (matrix, pivots) = with_borders(&self.jacobian, q, p)?;
         let mut y = [r, &[0.0]].concat();
         lu::solve(&matrix, size, &pivots, &mut y, 1);
         y.truncate(n);
@@ -222,6 +274,19 @@ impl<'a> Local<'a> {
     pub fn quadratic(&self, [q, p]: &[Vec<f64>; 2]) -> f64 {
         dot(p, &self.derivative(&[q, q]))
     }
+}
+
+/// Factors of A bordered by the column p and the row q.
+fn with_borders(a: &[f64], q: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
+    let (n, size) = (q.len(), q.len() + 1);
+    let mut matrix = vec![0.0; size * size];
+    for i in 0..n {
+        matrix[i * size..i * size + n].copy_from_slice(&a[i * n..(i + 1) * n]);
+        (matrix[i * size + n], matrix[n * size + i]) = (p[i], q[i]);
+    }
+    let mut pivots = vec![0; size];
+    lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+    Some((matrix, pivots))
 }
 
 /// Factorised A - z, possibly bordered.

@@ -51,9 +51,11 @@ mod manifold;
 mod oscillating;
 #[cfg(test)]
 mod tests;
+mod units;
 mod zero;
 
-pub use local::Local;
+pub use local::{ALIGNED, Local, SHIFTS, overlap};
+pub use units::units;
 
 use super::coefficients::Coefficients;
 use crate::diagram::{Kind, Point, Solution};
@@ -113,7 +115,7 @@ fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients,
     let measured = |formula: &dyn Fn(&Sample) -> Option<Vec<f64>>| uncertain.measured(formula);
     let resonant = || RESONANCE.to_string();
     if matches!(kind, Kind::Fold | Kind::Cusp | Kind::BranchPoint | Kind::ZeroHopf) {
-        let simple = measured(&|sample| one(sample.local.simplicity())).ok_or_else(resonant)?;
+        let simple = measured(&|sample| one(sample.local.simplicity(&uncertain.sizes))).ok_or_else(resonant)?;
         if simple.values[0].abs() <= simple.errors[0] {
             return Err("the eigenvalue 0 is double".into());
         }
@@ -174,7 +176,10 @@ fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     let share = PITCHFORK.max(uncertain.error.sqrt());
     let nearly = Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, share));
     let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
-    let mut found = uncertain.measured(&|sample| sample.local.crossing(&along, pitchfork)).ok_or(NONE)?;
+    let sizes = &uncertain.sizes;
+    let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x / sizes.get(i).copied().unwrap_or(1.0)).collect();
+    let measured = uncertain.measured_in_sizes(&|sample| sample.local.crossing(&along, pitchfork, sizes));
+    let mut found = measured.ok_or(NONE)?;
     if pitchfork {
         // By symmetry it is 0, or at most the observed value.
         found.errors[0] = quadratic.errors[0] + quadratic.values[0].abs();

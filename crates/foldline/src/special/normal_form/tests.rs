@@ -54,6 +54,17 @@ fn systems_in_normal_form_have_the_coefficients_they_are_written_with() {
     with(&[("x", "y"), ("y", "-x^3 + x^2*y")], 0.0, |at| assert!(at.takens().is_none()));
 }
 
+/// x' = v/k, v' = k (x² + x v/k): v is k times as large as x, whatever is declared.
+#[test]
+fn a_velocity_in_other_units_is_recognised() {
+    for k in [1.0, 1e3, 1e9] {
+        let model = model(&[("x", "v/p"), ("v", "p*(x^2 + x*v/p)")], k);
+        let (found, _) = units(&model, &[0.0, 0.0], &[k], &[1.0, 1.0]);
+        let ratio = found[1] / found[0] / k;
+        assert!((0.3..3.0).contains(&ratio), "{k}: {ratio}");
+    }
+}
+
 #[test]
 fn quadratic_terms_enter_the_first_lyapunov_coefficient() {
     // kuznetsov2004, §3.5: for u' = -v + …, ω = 1, l₁ from all second and third derivatives; here u' = -v + p u² + u v,
@@ -213,29 +224,51 @@ fn coordinates_do_not_change_a_branch_point() {
     let model = disguised(&["0.8*p*y0 + (-1.7)*y0^2 + 2*y0^3", "-y1", "-2*y2"], &SPACE, &turns, &drift);
     let at = origin(&model);
     let local = Local::new(&model, &at).unwrap();
-    let [quadratic, b] = local.crossing(&along, false).unwrap()[..] else { panic!("it is transcritical") };
+    let [quadratic, b] = local.crossing(&along, false, &[1.0; 8]).unwrap()[..] else { panic!("it is transcritical") };
     near(quadratic.abs(), -a);
     near(b, 0.8);
     let [q, _] = local.null_vectors().unwrap();
     let other: Vec<f64> = (0..4).map(|i| along[i] - if i < 3 { 0.8 / quadratic * q[i] } else { 0.0 }).collect();
-    let [same, back] = local.crossing(&other, false).unwrap()[..] else { panic!("it is transcritical") };
+    let [same, back] = local.crossing(&other, false, &[1.0; 8]).unwrap()[..] else { panic!("it is transcritical") };
     near(same, quadratic);
     near(back, -0.8);
     // Near the point a computed tangent may lie anywhere between the two, so the closer one counts.
     for (share, expected) in [(0.4, 0.8), (0.6, -0.8)] {
         let between: Vec<f64> = along.iter().zip(&other).map(|(a, b)| a + share * (b - a)).collect();
-        near(local.crossing(&between, false).unwrap()[1], expected);
+        near(local.crossing(&between, false, &[1.0; 8]).unwrap()[1], expected);
     }
     // ξ' = 0.8 μ ξ + c ξ³ with slaved states that add to c: y₁ = y₀² and 2 y₀ y₁.
     for (cubic, whole) in [("-5", -3.0), ("1.5", 3.5)] {
         let first = format!("0.8*p*y0 + ({cubic})*y0^3 + 2*y0*y1");
         let model = disguised(&[&first, "-y1 + y0^2", "-2*y2"], &[(2, 0, 0, 0.8), (2, 1, 1, 0.4)], &turns, &drift);
         let at = origin(&model);
-        let [zero, b, c] = Local::new(&model, &at).unwrap().crossing(&along, true).unwrap()[..] else {
+        let [zero, b, c] = Local::new(&model, &at).unwrap().crossing(&along, true, &[1.0; 8]).unwrap()[..] else {
             panic!("it is a pitchfork")
         };
         assert_eq!(zero, 0.0);
         near(b, 0.8);
         near(c, whole);
+    }
+}
+
+/// Two Brusselators that exchange their substances, in a state in which they differ: l₁ from the formula of kuznetsov2004,
+/// §5.4, evaluated independently. The state with the cells exchanged has the same.
+#[test]
+fn cells_that_are_exchanged_have_the_same_lyapunov_coefficient() {
+    let b = "3.3855532395352155";
+    let cell = |own: &str, other: &str| {
+        [
+            (format!("x{own}"), format!("1 - ({b} + 1)*x{own} + x{own}^2*y{own} + 0.05*(x{other} - x{own})")),
+            (format!("y{own}"), format!("{b}*x{own} - x{own}^2*y{own} + 5*0.05*(y{other} - y{own})")),
+        ]
+    };
+    let all: Vec<(String, String)> = [cell("1", "2"), cell("2", "1")].concat();
+    let all: Vec<(&str, &str)> = all.iter().map(|(a, b)| (a.as_str(), b.as_str())).collect();
+    let model = model(&all, 0.0);
+    let [one, other] = [[1.4227438216077268, 2.609323784808865], [0.577256178392273, 4.469396599882864]];
+    for state in [[one, other].concat(), [other, one].concat()] {
+        let at = Point { solution: Solution::Equilibrium(state), ..origin(&model) };
+        let found = Local::new(&model, &at).unwrap().hopf(0.32476006182662337).unwrap();
+        assert!((found - 4.764130).abs() < 1e-5, "{found}");
     }
 }

@@ -18,8 +18,9 @@ impl Local<'_> {
     }
 
     /// a and b of (3), or 0, b and c at a pitchfork. `along` `[n + k]`, in states and parameters, is a direction closer
-    /// to the branch than to the one that crosses it, per unit of its parameter. `None` if no branches cross.
-    pub fn crossing(&self, along: &[f64], pitchfork: bool) -> Option<Vec<f64>> {
+    /// to the branch than to the one that crosses it, per unit of its parameter. The states are measured in `units` `[n]`,
+    /// the coefficients are in those of the model. `None` if no branches cross.
+    pub fn crossing(&self, along: &[f64], pitchfork: bool, units: &[f64]) -> Option<Vec<f64>> {
         let vectors = self.null_vectors()?;
         // An interpolated tangent satisfies the linear equations only approximately.
         let off = self.bordered(&vectors, &self.derivative(&[along]))?;
@@ -27,8 +28,10 @@ impl Local<'_> {
         let (along, [q, p]) = (&along[..], vectors);
         let size = dot(&p, &q);
         let b = dot(&p, &self.derivative(&[&q, along])) / size;
+        // The null vector is of unit length in the units of the model.
+        let length = q.iter().zip(units).map(|(q, unit)| (q * unit).powi(2)).sum::<f64>().sqrt();
         if pitchfork {
-            return Some(vec![0.0, b, self.cusp()?]);
+            return Some(vec![0.0, b, self.cusp()? / (length * length)]);
         }
         // Near the point both tangents and all vectors between them satisfy the linear equations. The tangents of the
         // branches, along + t q, are the roots of a t² + b t + ½ ⟨p, f(along, along)⟩, and b is half its derivative at
@@ -36,12 +39,17 @@ impl Local<'_> {
         let a = self.fold()?;
         let rest = 0.5 * dot(&p, &self.derivative(&[along, along])) / size;
         let square = b * b - 4.0 * a * rest;
-        (square >= 0.0).then(|| vec![a, square.sqrt().copysign(b)])
+        (square >= 0.0).then(|| vec![a / length, square.sqrt().copysign(b)])
     }
 
-    /// ⟨p, q⟩ of null vectors of unit length, which vanishes if the eigenvalue 0 is double.
-    pub(super) fn simplicity(&self) -> Option<f64> {
-        self.null_vectors().map(|[q, p]| dot(&p, &q))
+    /// ⟨p, q⟩ of null vectors of unit length, with the states in terms of their sizes `[n]`. It vanishes if the
+    /// eigenvalue 0 is double.
+    pub(super) fn simplicity(&self, sizes: &[f64]) -> Option<f64> {
+        let [q, p] = self.null_vectors()?;
+        let norm = |v: &[f64], power: i32| {
+            v.iter().zip(sizes).map(|(v, size)| (v * size.powi(power)).powi(2)).sum::<f64>().sqrt()
+        };
+        Some(dot(&p, &q) / (norm(&q, -1) * norm(&p, 1)))
     }
 
     /// True if a ξ² is less than c ξ³ at the amplitude ξ at which ξ q is `share` of the `scales` `[n]` of the states.

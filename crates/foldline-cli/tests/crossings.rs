@@ -1,0 +1,144 @@
+//! Branches that leave a branch point, however the branches met there first, and points whose states differ in size.
+//! Positions and coefficients follow from closed forms unless a source is given.
+
+use std::process::Command;
+
+/// Output and exit code of a run of this model and study, at a tolerance.
+fn run(model: &str, study: &str, tolerance: &str) -> (String, i32) {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("model.toml"), format!("name = \"m\"\n{model}")).unwrap();
+    let study = format!("model = \"model.toml\"\ntolerance = {tolerance}\n{study}");
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_foldline"));
+    let output = command.args(["run", "study.toml", "--out", "run"]).current_dir(folder.path()).output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    (text, output.status.code().unwrap())
+}
+
+/// Lines that begin with the name of a branch and its kind.
+fn points<'t>(text: &'t str, branch: &str, kind: &str) -> Vec<&'t str> {
+    text.lines().filter(|line| line.split_whitespace().take(2).eq([branch, kind])).collect()
+}
+
+fn value(line: &str, column: usize) -> f64 {
+    line.split_whitespace().nth(column).unwrap().parse().unwrap()
+}
+
+/// Study of a branch `b` in `free` from a state, with branches that leave its branch points.
+fn followed(state: &str, free: &str, range: &str) -> String {
+    format!(
+        "[[seed]]\nname = \"s\"\nstate = {state}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"{free}\"\nrange = {range}\n\
+         switch = {{ branch-point = 1 }}\n"
+    )
+}
+
+#[test]
+fn lines_that_cross_at_a_modest_angle_are_two_branches() {
+    let pairs = [
+        ("(x + 1.47*a - 0.31)*(x + 0.59*a + 0.17)", "0.83", "-0.9101"),
+        ("(x + 0.6*a - 0.29)*(x + 0.4*a + 0.08)", "-0.05", "0.32"),
+    ];
+    for (product, a, x) in pairs {
+        let model = format!("[parameters]\na = {a}\n[states]\nx = {{ equation = \"-{product}\", range = [-2, 2] }}\n");
+        let (text, code) = run(&model, &followed(&format!("{{ x = {x} }}"), "a", "[-2, 2]"), "1e-6");
+        assert_eq!(code, 0, "{text}");
+        assert!(
+            text.contains("b/branch-point-1 ") && points(&text, "b/branch-point-1", "branch-point").len() == 1,
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn a_pitchfork_met_along_its_side_branch_leads_to_the_branch_of_symmetric_states() {
+    let single = "[parameters]\na = 1\n[states]\nx = { equation = \"a*x - x^3\", range = [-2, 2] }\n";
+    for range in ["[-2, 5]", "[-1, 4]", "[-0.5, 2.5]"] {
+        let (text, code) = run(single, &followed("{ x = 1 }", "a", range), "1e-6");
+        assert_eq!(code, 0, "{text}");
+        // x = 0, which changes its stability at a = 0.
+        let here = points(&text, "b/branch-point-1", "branch-point");
+        assert!(here.len() == 1 && value(here[0], 2).abs() < 1e-8, "{text}");
+    }
+    // Two cells: x = y = 0 is singular at a = 0 in the sum and at a = 2 k in the difference.
+    for a in ["0.2", "0.3", "0.5"] {
+        let model = format!(
+            "[parameters]\na = {a}\nk = 1\n[states]\nx = {{ equation = \"a*x - x^3 + k*(y - x)\", range = [-2, 2] }}\n\
+             y = {{ equation = \"a*y - y^3 + k*(x - y)\", range = [-2, 2] }}\n"
+        );
+        let x = a.parse::<f64>().unwrap().sqrt();
+        let (text, code) = run(&model, &followed(&format!("{{ x = {x}, y = {x} }}"), "a", "[-1, 4]"), "1e-6");
+        assert_eq!(code, 0, "{text}");
+        let mut here: Vec<f64> =
+            points(&text, "b/branch-point-1", "branch-point").iter().map(|line| value(line, 2)).collect();
+        here.sort_by(f64::total_cmp);
+        assert!(here.len() == 2 && here[0].abs() < 1e-8 && (here[1] - 2.0).abs() < 1e-8, "{text}");
+    }
+}
+
+/// Ueda's oscillator: the asymmetric cycles and their period doubling at B = 4.876091 agree at tolerances from 1e-4 to
+/// 1e-8.
+#[test]
+fn asymmetric_cycles_are_told_from_symmetric_ones_at_a_loose_tolerance() {
+    let model = "[parameters]\nB = 1\n[forcing]\nfrequency = \"1\"\n[states]\nx = { equation = \"v\", range = [-3, 3] }\n\
+                 v = { equation = \"-0.1*v - x^3 + B*cos(t)\", range = [-3, 3] }\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"B\"\n\
+                 range = [0.5, 6]\nswitch = { branch-point = 1 }\n";
+    let (text, code) = run(model, study, "1e-4");
+    assert_eq!(code, 0, "{text}");
+    let doubling = points(&text, "b/branch-point-1", "period-doubling");
+    assert!(!doubling.is_empty() && (value(doubling[0], 2) - 4.876091).abs() < 1e-5, "{text}");
+}
+
+#[test]
+fn two_branch_points_within_a_step_along_a_line_are_found() {
+    // The line meets the parabola twice: 0.33 a + 0.02 = ±√(0.27 - a), and the other line at 0.31/1.08.
+    let product = "(x - 0.33*a - 0.27)*(a - 0.27 + (x - 0.25)^2)*(x + 0.75*a - 0.58)";
+    let model = format!("[parameters]\na = 0.83\n[states]\nx = {{ equation = \"-{product}\", range = [-2, 2] }}\n");
+    let (text, code) = run(&model, &followed("{ x = 0.5439 }", "a", "[-2, 2]"), "1e-6");
+    assert_eq!(code, 0, "{text}");
+    let mut here: Vec<f64> = points(&text, "b", "branch-point").iter().map(|line| value(line, 2)).collect();
+    here.sort_by(f64::total_cmp);
+    assert!(here.len() == 2 && (here[0] - 0.258884143).abs() < 1e-8 && (here[1] - 0.31 / 1.08).abs() < 1e-8, "{text}");
+}
+
+#[test]
+fn a_bogdanov_takens_point_does_not_depend_on_the_unit_of_a_velocity() {
+    for factor in ["1", "1e3", "1e4", "1e7"] {
+        let model = format!(
+            "[parameters]\nm1 = -0.5\nm2 = 0.2\n[states]\nx = {{ equation = \"v/{factor}\", range = [-2, 1] }}\n\
+             v = {{ equation = \"{factor}*(m1 + m2*v/{factor} + x^2 + x*v/{factor})\", range = [-{factor}, {factor}] }}\n"
+        );
+        let study = "[[seed]]\nname = \"s\"\nstate = { x = -0.7, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"m1\"\n\
+                     range = [-2, 0.5]\n[[curve]]\nname = \"F\"\nhold = \"fold\"\nof = \"b\"\nfree = \"m2\"\nrange = [-2, 2]\n";
+        let (text, code) = run(&model, study, "1e-6");
+        let here = points(&text, "F", "bogdanov-takens");
+        assert!(code == 0 && here.len() == 1 && points(&text, "F", "cusp").is_empty(), "{factor}: {text}");
+        assert!(value(here[0], 2).abs() < 1e-9 && value(here[0], 3).abs() < 1e-9, "{factor}: {text}");
+    }
+}
+
+#[test]
+fn a_transcritical_point_of_states_of_different_size_has_its_coefficients() {
+    // At K = 1/3 the predator appears: b = 1/(1 + K)^2, and a is inverse to the unit of the predator.
+    for unit in ["1", "1e6", "1e9"] {
+        let model = format!(
+            "[parameters]\nK = 0.2\n[states]\nx = {{ equation = \"x*(1 - x/K) - x*(y/{unit})/(1 + x)\", range = [0, 4] }}\n\
+             y = {{ equation = \"y*(x/(1 + x) - 0.25)\", range = [0, 3{}] }}\n",
+            unit.trim_start_matches('1')
+        );
+        let (text, _) = run(&model, &followed("{ x = 0.2, y = 0 }", "K", "[0.1, 1]"), "1e-6");
+        let here = points(&text, "b", "branch-point");
+        assert!(here.len() == 1 && here[0].contains("b = 0.56250, transcritical"), "{unit}: {text}");
+    }
+}
+
+#[test]
+fn no_generalised_hopf_point_is_read_from_the_rounding_of_a_vanishing_frequency() {
+    // Predator and prey with an Allee effect: l1 < 0 for all b < 1, and the frequency vanishes at b = 1.
+    let model = "[parameters]\nd = -0.8\nb = 0.2\n[states]\nN = { equation = \"N*(N - b)*(1 - N) - N*P\", range = [0, 1] }\n\
+                 P = { equation = \"P*(N + d)\", range = [0, 1] }\n";
+    let study = followed("{ N = 1, P = 0 }", "d", "[-1.2, -0.1]")
+        + "[[curve]]\nname = \"H\"\nhold = \"hopf\"\nof = \"b/branch-point-1\"\nfree = \"b\"\nrange = [-1, 1]\n";
+    let (text, code) = run(model, &study, "1e-6");
+    assert!(code == 0 && text.contains("\nH ") && points(&text, "H", "generalised-hopf").is_empty(), "{text}");
+}
