@@ -183,6 +183,8 @@ pub fn branch_of<'b>(
     observer: &dyn Observer,
 ) -> Option<&'b str> {
     let value = *point.parameters.get(free)?;
+    // The size of an angle, and with it the slope, depends on its copy.
+    let angles = system.field.periods().iter().any(|period| period.is_finite());
     let found = branches.iter().filter(|b| b.free == free && b.held.is_none()).find(|branch| {
         track(branch).windows(2).any(|pair| {
             let (a, b) = (pair[0].parameters[free], pair[1].parameters[free]);
@@ -218,7 +220,7 @@ pub fn branch_of<'b>(
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
                 close(once.as_ref().unwrap_or(found), WITHIN * settings.tolerance)
                     && turn(problem, &guess, found).is_none_or(|own| own <= most)
-                    && (turns > 1.0 || slopes_agree(point, found))
+                    && (turns > 1.0 || angles || slopes_agree(point, found))
             };
             let near = polished(&mut *problem, settings, &guess);
             if near.is_ok_and(|found| same(&mut *problem, &found.point)) {
