@@ -215,6 +215,9 @@ pub fn branch_of<'b>(
             let mut problem = problem_of(system, free, degree, &guess, false);
             let most = TURN * turn(&mut *problem, &left, &right).unwrap_or(0.0) + SLACK;
             guess.parameters[free] = value;
+            if !guess.solution.mesh().is_empty() {
+                problem.set_mesh(&guess.solution.mesh());
+            }
             // Next to a crossing, Newton's method may go to the other branch.
             let same = |problem: &mut dyn ZeroProblem, found: &Point| {
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
