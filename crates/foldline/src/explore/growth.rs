@@ -103,7 +103,7 @@ impl Line {
             Solution::Cycle(cycle) if holds.singular => {
                 Box::new(OnCycleBranchPoints::in_three_parameters(setting, cycle))
             }
-            _ if holds.singular => Box::new(OnBranchPoints::in_three_parameters(setting)),
+            _ if holds.singular => Box::new(OnBranchPoints::in_further_parameters(setting)),
             _ => Box::new(OnLevels::new(setting, &holds.levels, &sizes, &like)),
         };
         Box::new(Held::new(surface, condition, free))
