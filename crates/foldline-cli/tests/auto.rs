@@ -141,6 +141,8 @@ demos! {
     pvl,
     #[ignore = "takes seconds"]
     r3b,
+    #[ignore = "takes seconds"]
+    r3b2,
     rev,
     #[ignore = "takes seconds"]
     san,
