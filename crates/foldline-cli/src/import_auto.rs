@@ -5,7 +5,9 @@ use crate::arguments::{Format, ImportAuto as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::table::{Cell, Column, Style, Table, write as write_table};
 use crate::verbosity::report;
-use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, Text, data_of, program, read_solutions, study};
+use foldline_store::auto::{
+    Chosen, Complaint, Labelled, Mapping, Names, Text, data_of, program, read_solutions, study,
+};
 use foldline_store::model_file::{parse_model, read_model};
 use foldline_store::study_file::parse_study;
 use std::io::stdout;
@@ -24,7 +26,10 @@ pub fn answer(typed: &Typed) -> Result<Outcome, Failure> {
         return translated(typed, file);
     }
     if typed.output.is_some() && typed.model.is_none() {
-        return Err(Failure::typed("--output needs --model, the model with the same equations", "give the model, or the equations file"));
+        return Err(Failure::typed(
+            "--output needs --model, the model with the same equations",
+            "give the model, or the equations file",
+        ));
     }
     let sources = sources(&typed.files)?;
     let chosen = chosen(&sources, &typed.label)?;
@@ -53,7 +58,10 @@ fn translated(typed: &Typed, file: &Path) -> Result<Outcome, Failure> {
         None if beside.exists() => beside,
         None => {
             let message = format!("the constants file {} does not exist", beside.display());
-            return Err(Failure::typed(message, "give the constants of the first run after the equations, such as c.NAME.1"));
+            return Err(Failure::typed(
+                message,
+                "give the constants of the first run after the equations, such as c.NAME.1",
+            ));
         }
     };
     let read = |file: &Path| {

@@ -259,7 +259,9 @@ fn the_largest_sum_of_coordinates_is_followed_from_two_of_them_to_five() {
     let model = "[parameters]\ns = 1\nx3 = 0\nx4 = 0\nx5 = 0\n[definitions]\nx1 = \"s - x2 - x3 - x4 - x5\"\n[states]\n\
         x2 = \"x1^2 + x2^2 + x3^2 + x4^2 + x5^2 - 1\"\n";
     let curve = |name: &str, of: &str, free: &str| {
-        format!("[[curve]]\nname = \"{name}\"\nhold = \"branch-point\"\nof = \"{of}\"\nfree = \"{free}\"\nrange = [-2, 2]\n")
+        format!(
+            "[[curve]]\nname = \"{name}\"\nhold = \"branch-point\"\nof = \"{of}\"\nfree = \"{free}\"\nrange = [-2, 2]\n"
+        )
     };
     let start = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = { x2 = 0 }\n[[branch]]\nname = \"two\"\nfrom = \"s\"\nfree = \"s\"\n\
         until = 1.3\n[[branch]]\nname = \"circle\"\nfrom = \"two\"\nfree = \"x3\"\nrange = [-2, 2]\n[[curve]]\nname = \"three\"\n\
@@ -282,8 +284,9 @@ fn the_largest_sum_of_coordinates_is_followed_from_two_of_them_to_five() {
     // Along the curves the coordinates that are solved for are equal: s is extremal over them.
     for point in &diagram.branch("five").unwrap().points {
         let [s, x3, x4, x5] = point.parameters[..] else { panic!() };
-        let known = 2.0 * (1.0 - x5 * x5).max(0.0).sqrt() + x5;
-        assert!((x3 - x4).abs() < 1e-7 && (s - known).abs() < 1e-7, "{s} {x3} {x4} {x5}");
+        let on_sphere = 4.0 * x3 * x3 + x5 * x5 - 1.0;
+        let equal = (x3 - x4).abs().max((s - 4.0 * x3 - x5).abs());
+        assert!(equal < 1e-7 && on_sphere.abs() < 1e-7, "{s} {x3} {x4} {x5}");
     }
     // A curve without an extremum starts no other one, and says so.
     let none = start.replace("range = [0.5, 3]", "range = [0.5, 1.5]") + &curve("four", "three", "x4");

@@ -148,7 +148,8 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
             Start::EndOfCurve(index) if rest.is_empty() => of_curve(walk, item, ground, known, index),
             _ => {
                 let (short, noun) = (&known.name, with_article(noun(&known.start)));
-                let message = format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch or a curve");
+                let message =
+                    format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch or a curve");
                 walk.report(
                     value.span(),
                     message,
@@ -203,7 +204,11 @@ fn of_curve(walk: &mut Walk, item: &Item, ground: &Ground, known: &Known, index:
     while let Some(below) = ground.items.curves.iter().find(|own| own.name == of.of) {
         of = below;
     }
-    let plan = ground.items.branches.iter().find(|own| of.of.strip_prefix(&own.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')));
+    let plan = ground
+        .items
+        .branches
+        .iter()
+        .find(|own| of.of.strip_prefix(&own.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')));
     let (plan, beginning) = (plan?.clone(), known.beginning.clone());
     Some(Base { name: known.name.clone(), plan, curve: Some(index), beginning, family: known.family })
 }
@@ -373,14 +378,22 @@ fn further(
             && all.iter().any(|(other, _)| *other == index)
         {
             let name = &ground.model.parameters[index].name;
-            walk.report(value.span(), format!("{name} is already free along \"{}\"", own.name), "another parameter of the model");
+            walk.report(
+                value.span(),
+                format!("{name} is already free along \"{}\"", own.name),
+                "another parameter of the model",
+            );
             return None;
         }
         return Some(all);
     };
     let taken = [base.map(|base| base.plan.free), second];
     if curve.is_some() {
-        walk.report(value.span(), "a curve that starts on a curve has the parameters of that one and its own", "leave out `also`");
+        walk.report(
+            value.span(),
+            "a curve that starts on a curve has the parameters of that one and its own",
+            "leave out `also`",
+        );
         return None;
     }
     let model = ground.model;

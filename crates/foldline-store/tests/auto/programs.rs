@@ -5,7 +5,8 @@ use foldline_store::auto::{Program, Text, program};
 use foldline_store::model_file::parse_model;
 use foldline_store::study_file::parse_study;
 
-const REST: &str = "      SUBROUTINE BCND\n      END SUBROUTINE BCND\n      SUBROUTINE ICND\n      END SUBROUTINE ICND\n";
+const REST: &str =
+    "      SUBROUTINE BCND\n      END SUBROUTINE BCND\n      SUBROUTINE ICND\n      END SUBROUTINE ICND\n";
 
 fn translated(file: &str, text: &str, constants: &str) -> Result<Program, String> {
     let found = program(Text { file, text }, Text { file: "c.own", text: constants }, None, ["own", "own-model.toml"]);
@@ -22,7 +23,8 @@ fn has(text: &str, lines: &[&str]) {
     }
 }
 
-const CONSTANTS: &str = "NDIM= 3, IPS = 1, IRS = 0\nICP = ['k'], UZR = {'k': [0.5, 1.5]}\nparnames = {1: 'k'}\nRL0 = 0.0, RL1 = 2.0\n";
+const CONSTANTS: &str =
+    "NDIM= 3, IPS = 1, IRS = 0\nICP = ['k'], UZR = {'k': [0.5, 1.5]}\nparnames = {1: 'k'}\nRL0 = 0.0, RL1 = 2.0\n";
 
 #[test]
 fn loops_functions_and_integers_of_fortran_become_plain_equations() {
@@ -60,13 +62,25 @@ fn boundary_value_problems_keep_conditions_integrals_and_determined_parameters()
         FB(1) = U0(1)\n      FB(2) = U1(1) - PAR(3)*U0(2)**2\n      END\n      \
         SUBROUTINE ICND(NDIM,PAR,ICP,NINT,U,UOLD,UDOT,UPOLD,FI,IJAC,DINT)\n      DOUBLE PRECISION PAR(*), U(NDIM), FI(NINT)\n      \
         FI(1) = U(1) - 0.25d0\n      END\n";
-    let constants = "NDIM = 2, IPS = 4, IRS = 0, NBC = 2, NINT = 1\nICP = [1, 2]\nunames = {1: 'temp'}\nNMX = 20, DSMAX = 0.1";
+    let constants =
+        "NDIM = 2, IPS = 4, IRS = 0, NBC = 2, NINT = 1\nICP = [1, 2]\nunames = {1: 'temp'}\nNMX = 20, DSMAX = 0.1";
     let found = translated("own.f", text, constants).unwrap();
     has(
         &found.model,
-        &["solve = [\"p2\"]", "u2 = \"-p1*exp(temp) + p2\"", "condition_2 = \"temp@1 - p3*u2@0^2\"", "condition_1 = \"temp - 0.25\""],
+        &[
+            "solve = [\"p2\"]",
+            "u2 = \"-p1*exp(temp) + p2\"",
+            "condition_2 = \"temp@1 - p3*u2@0^2\"",
+            "condition_1 = \"temp - 0.25\"",
+        ],
     );
-    has(&found.study, &["state = { temp = \"t*(1 - t)\", u2 = \"1 - 2*t\" }", "range = [-1, 3] # edit as needed: NMX steps of DSMAX to both sides"]);
+    has(
+        &found.study,
+        &[
+            "state = { temp = \"t*(1 - t)\", u2 = \"1 - 2*t\" }",
+            "range = [-1, 3] # edit as needed: NMX steps of DSMAX to both sides",
+        ],
+    );
 }
 
 #[test]
@@ -113,10 +127,19 @@ fn what_has_no_counterpart_is_refused_with_its_line_and_a_cure() {
         ("F(1)", "F(2)", usual, "the index 2 lies outside the array", "own.f90:4:7"),
         ("a = 1\n", "a = 1\n", "NDIM=1, IPS=5, ICP=[1]", "IPS = 5 optimises a functional", "c.own:1:1"),
         ("a = 1\n", "a = 1\n", "NDIM=2, IPS=1, ICP=[1]", "FUNC does not set F(2)", "own.f90:1:7"),
-        ("a = 1\n", "a = 1\n", "NDIM=1, IPS=4, NBC=0, NINT=1, ICP=[1]", "the solution before (UOLD, UDOT or UPOLD)", "own.f90:11:7"),
+        (
+            "a = 1\n",
+            "a = 1\n",
+            "NDIM=1, IPS=4, NBC=0, NINT=1, ICP=[1]",
+            "the solution before (UOLD, UDOT or UPOLD)",
+            "own.f90:11:7",
+        ),
     ];
     for (from, to, constants, message, place) in cases {
         let said = translated("own.f90", &text.replacen(from, to, 1), constants).unwrap_err();
-        assert!(said.contains(message) && said.contains(place) && said.contains("help: "), "{message}, {place}:\n{said}");
+        assert!(
+            said.contains(message) && said.contains(place) && said.contains("help: "),
+            "{message}, {place}:\n{said}"
+        );
     }
 }

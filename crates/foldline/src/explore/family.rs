@@ -281,10 +281,21 @@ impl Work<'_> {
             until: curve.until,
             switching: Switching::default(),
             // An extremum of the parameter that is solved for can be followed in one more parameter.
-            marks: curve.further.first().map(|own| Mark::peak(Quantity::Parameter(own.0))).into_iter().chain(curve.marks.clone()).collect(),
+            marks: curve
+                .further
+                .first()
+                .map(|own| Mark::peak(Quantity::Parameter(own.0)))
+                .into_iter()
+                .chain(curve.marks.clone())
+                .collect(),
             max_points: curve.max_points,
             holds: Holds {
-                others: curve.further.iter().map(|(index, range)| (*index, Some(*range))).chain([(first, Some(curve.ranges[0]))]).collect(),
+                others: curve
+                    .further
+                    .iter()
+                    .map(|(index, range)| (*index, Some(*range)))
+                    .chain([(first, Some(curve.ranges[0]))])
+                    .collect(),
                 singular: true,
                 ..Holds::default()
             },

@@ -166,7 +166,11 @@ impl Reader {
                         _ => "*",
                     };
                     self.take(";");
-                    let what = Statement::Assign(name, places.unwrap_or_default(), X::Binary(sign, Box::new(old), Box::new(right)));
+                    let what = Statement::Assign(
+                        name,
+                        places.unwrap_or_default(),
+                        X::Binary(sign, Box::new(old), Box::new(right)),
+                    );
                     return Ok(vec![Line { number, what }]);
                 }
                 None if targets.is_empty() && places.is_some() && self.is(";") => {

@@ -40,7 +40,10 @@ fn statements(text: &str, fixed: bool) -> Vec<(usize, String)> {
         }
     }
     let split = |(number, text): (usize, String)| {
-        text.split(';').map(|part| (number, part.trim().to_string())).filter(|(_, part)| !part.is_empty()).collect::<Vec<_>>()
+        text.split(';')
+            .map(|part| (number, part.trim().to_string()))
+            .filter(|(_, part)| !part.is_empty())
+            .collect::<Vec<_>>()
     };
     all.into_iter().flat_map(split).collect()
 }
@@ -68,7 +71,8 @@ pub(super) fn routines(text: &str, fixed: bool) -> Result<Vec<Routine>, Stop> {
         let (number, text) = &all[at];
         at += 1;
         let lower = text.to_lowercase();
-        let words: Vec<&str> = lower.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).filter(|w| !w.is_empty()).collect();
+        let words: Vec<&str> =
+            lower.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).filter(|w| !w.is_empty()).collect();
         let Some(place) = words.iter().position(|word| *word == "subroutine" || *word == "function") else { continue };
         if words[0] == "end" || lower.contains('=') || place > 3 {
             continue;
@@ -178,7 +182,9 @@ fn statement(
             Ok(vec![Statement::Call(name, places.unwrap_or_default())])
         }
         "return" => Ok(vec![Statement::Return]),
-        "implicit" | "use" | "save" | "external" | "intrinsic" | "common" | "include" | "continue" | "intent" => Ok(Vec::new()),
+        "implicit" | "use" | "save" | "external" | "intrinsic" | "common" | "include" | "continue" | "intent" => {
+            Ok(Vec::new())
+        }
         _ if TYPES.contains(&first) => declarations(own, text),
         _ => Ok(vec![Statement::Other(text.to_string())]),
     }

@@ -35,7 +35,13 @@ fn implicit(name: &str) -> bool {
 
 impl Variable {
     pub(super) fn scalar(value: Option<V>) -> Variable {
-        Variable { cells: Rc::new(RefCell::new(vec![value])), offset: 0, shape: Vec::new(), local: true, integer: false }
+        Variable {
+            cells: Rc::new(RefCell::new(vec![value])),
+            offset: 0,
+            shape: Vec::new(),
+            local: true,
+            integer: false,
+        }
     }
 
     /// An array with indices from 1.
@@ -103,7 +109,15 @@ fn is_function(name: &str, places: &[Place], frame: &Frame) -> bool {
 
 impl<'r> Machine<'r> {
     pub(super) fn new(routines: &'r [Routine]) -> Machine<'r> {
-        Machine { routines, outside: HashMap::new(), definitions: Vec::new(), taken: Vec::new(), defines: false, functions: Vec::new(), steps: 0 }
+        Machine {
+            routines,
+            outside: HashMap::new(),
+            definitions: Vec::new(),
+            taken: Vec::new(),
+            defines: false,
+            functions: Vec::new(),
+            steps: 0,
+        }
     }
 
     pub(super) fn routine(&self, name: &str) -> Option<&'r Routine> {
@@ -142,7 +156,9 @@ impl<'r> Machine<'r> {
                 return stop(number, format!("this statement is not translated: {text}"), super::syntax::SIMPLER);
             }
             Statement::Assign(name, places, value) if is_function(name, places, frame) => {
-                let arguments = places.iter().filter_map(|place| if let Place::At(X::Name(own)) = place { Some(own.clone()) } else { None });
+                let arguments = places
+                    .iter()
+                    .filter_map(|place| if let Place::At(X::Name(own)) = place { Some(own.clone()) } else { None });
                 self.functions.retain(|(own, ..)| own != name);
                 self.functions.push((name.clone(), arguments.collect(), value));
             }
@@ -159,7 +175,11 @@ impl<'r> Machine<'r> {
             }
             Statement::Call(name, places) => {
                 let Some(routine) = self.routine(name) else {
-                    return stop(number, format!("the subroutine `{name}` is not in this file"), "write the model by hand");
+                    return stop(
+                        number,
+                        format!("the subroutine `{name}` is not in this file"),
+                        "write the model by hand",
+                    );
                 };
                 let given = self.arguments(routine, places, frame, number, depth)?;
                 self.run(routine, given, depth + 1)?;
@@ -200,7 +220,11 @@ impl<'r> Machine<'r> {
             V::Logical(own) => Ok(own),
             V::Number(own, _) => Ok(own != 0.0),
             V::Opaque(why) => stop(line, why, "write the model by hand"),
-            _ => stop(line, "this condition is not known when the model is written", "write the model by hand with `if(condition, a, b)`"),
+            _ => stop(
+                line,
+                "this condition is not known when the model is written",
+                "write the model by hand with `if(condition, a, b)`",
+            ),
         }
     }
 
@@ -288,7 +312,8 @@ impl<'r> Machine<'r> {
             };
             let mut next = Vec::new();
             for at in range {
-                let Some(at) = usize::try_from(at - low).ok().filter(|at| length.is_none_or(|length| *at < length)) else {
+                let Some(at) = usize::try_from(at - low).ok().filter(|at| length.is_none_or(|length| *at < length))
+                else {
                     return stop(line, format!("the index {at} lies outside the array"), "correct the equations file");
                 };
                 next.extend(all.iter().map(|before| before + stride * at));
@@ -318,13 +343,23 @@ impl<'r> Machine<'r> {
                 frame.insert(name.to_string(), own.clone());
                 own
             }
-            None => return stop(line, format!("`{name}` is not declared as an array here"), "declare it, or write the model by hand"),
+            None => {
+                return stop(
+                    line,
+                    format!("`{name}` is not declared as an array here"),
+                    "declare it, or write the model by hand",
+                );
+            }
         };
         let (cells, _) = self.selected(&own, places, frame, line, depth)?;
         if let V::List(all) = &value
             && all.len() != cells.len()
         {
-            return stop(line, format!("{} values are assigned to {} elements", all.len(), cells.len()), "correct the equations file");
+            return stop(
+                line,
+                format!("{} values are assigned to {} elements", all.len(), cells.len()),
+                "correct the equations file",
+            );
         }
         let single = cells.len() == 1 && own.shape.is_empty();
         for (k, at) in cells.into_iter().enumerate() {
@@ -346,7 +381,9 @@ impl<'r> Machine<'r> {
 
     /// A compound value as a definition.
     fn defined(&mut self, name: &str, value: V, line: usize) -> Result<V, Stop> {
-        if !self.defines || !matches!(&value, V::Symbol(_, tight) if *tight < Tight::Atom || value.text(line)?.0.contains('(')) {
+        if !self.defines
+            || !matches!(&value, V::Symbol(_, tight) if *tight < Tight::Atom || value.text(line)?.0.contains('('))
+        {
             return Ok(value);
         }
         let (text, _) = value.text(line)?;
@@ -372,7 +409,9 @@ impl<'r> Machine<'r> {
     ) -> Result<Vec<Variable>, Stop> {
         let mut all = Vec::new();
         for place in places.iter().take(routine.arguments.len()) {
-            let Place::At(x) = place else { return stop(line, "this argument is not understood", "write the model by hand") };
+            let Place::At(x) = place else {
+                return stop(line, "this argument is not understood", "write the model by hand");
+            };
             let referred = match x {
                 X::Name(name) => frame.get(name).cloned(),
                 X::Of(name, places) => match frame.get(name).cloned() {
@@ -381,7 +420,11 @@ impl<'r> Machine<'r> {
                         let first = cells.first().copied().unwrap_or(0);
                         let next = cells.iter().enumerate().all(|(k, at)| *at == first + k);
                         if !next {
-                            return stop(line, "a section that is not contiguous is passed here", "write the model by hand");
+                            return stop(
+                                line,
+                                "a section that is not contiguous is passed here",
+                                "write the model by hand",
+                            );
                         }
                         let length = if cells.len() > 1 { Some(cells.len()) } else { None };
                         let (local, integer) = (own.local, own.integer);
@@ -395,7 +438,9 @@ impl<'r> Machine<'r> {
             all.push(match referred {
                 Some(own) => own,
                 None => match self.value(x, frame, line, depth)? {
-                    V::List(values) => Variable { local: true, ..Variable::array(values.into_iter().map(Some).collect()) },
+                    V::List(values) => {
+                        Variable { local: true, ..Variable::array(values.into_iter().map(Some).collect()) }
+                    }
                     value => Variable::scalar(Some(value)),
                 },
             });
@@ -421,7 +466,13 @@ impl<'r> Machine<'r> {
             X::Unary("!", own) => match self.value(own, frame, line, depth)? {
                 V::Logical(own) => V::Logical(!own),
                 V::Number(own, _) => V::Logical(own == 0.0),
-                _ => return stop(line, "this condition is not known when the model is written", "write the model by hand"),
+                _ => {
+                    return stop(
+                        line,
+                        "this condition is not known when the model is written",
+                        "write the model by hand",
+                    );
+                }
             },
             X::Unary(_, own) => negative(self.value(own, frame, line, depth)?, line)?,
             X::Binary(sign, left, right) => {
@@ -438,7 +489,13 @@ impl<'r> Machine<'r> {
             X::Name(name) => match frame.get(name).cloned() {
                 Some(own) if own.shape.is_empty() => match own.get(0) {
                     Some(value) => value,
-                    None => return stop(line, format!("`{name}` has no value here"), "assign it before, in this subroutine"),
+                    None => {
+                        return stop(
+                            line,
+                            format!("`{name}` has no value here"),
+                            "assign it before, in this subroutine",
+                        );
+                    }
                 },
                 Some(own) => self.list(name, &own, &[], frame, line, depth)?,
                 None => match self.outside.get(name) {
@@ -473,7 +530,13 @@ impl<'r> Machine<'r> {
         for at in cells {
             match own.get(at) {
                 Some(value) => values.push(value),
-                None => return stop(line, format!("{name}({}) has no value here", at + 1), "assign it before, in this subroutine"),
+                None => {
+                    return stop(
+                        line,
+                        format!("{name}({}) has no value here", at + 1),
+                        "assign it before, in this subroutine",
+                    );
+                }
             }
         }
         Ok(match (values.pop(), list) {
@@ -486,7 +549,14 @@ impl<'r> Machine<'r> {
         })
     }
 
-    fn applied(&mut self, name: &str, places: &[Place], frame: &mut Frame, line: usize, depth: usize) -> Result<V, Stop> {
+    fn applied(
+        &mut self,
+        name: &str,
+        places: &[Place],
+        frame: &mut Frame,
+        line: usize,
+        depth: usize,
+    ) -> Result<V, Stop> {
         if let Some(routine) = self.routine(name) {
             let given = self.arguments(routine, places, frame, line, depth)?;
             let inner = self.run(routine, given, depth + 1)?;
@@ -498,7 +568,9 @@ impl<'r> Machine<'r> {
         if let Some((_, names, body)) = self.functions.iter().find(|(own, ..)| own == name).cloned() {
             let mut inner = frame.clone();
             for (own, place) in names.iter().zip(places) {
-                let Place::At(x) = place else { return stop(line, "this argument is not understood", "write the model by hand") };
+                let Place::At(x) = place else {
+                    return stop(line, "this argument is not understood", "write the model by hand");
+                };
                 let value = self.value(x, frame, line, depth)?;
                 inner.insert(own.clone(), Variable::scalar(Some(value)));
             }
@@ -509,12 +581,18 @@ impl<'r> Machine<'r> {
         }
         let mut given = Vec::new();
         for place in places {
-            let Place::At(x) = place else { return stop(line, format!("`{name}` is not declared as an array"), "declare it") };
+            let Place::At(x) = place else {
+                return stop(line, format!("`{name}` is not declared as an array"), "declare it");
+            };
             given.push(self.value(x, frame, line, depth)?);
         }
         match intrinsic(name, &given, line)? {
             Some(value) => Ok(value),
-            None => stop(line, format!("`{name}` is neither an array nor a function that is known here"), "write the model by hand"),
+            None => stop(
+                line,
+                format!("`{name}` is neither an array nor a function that is known here"),
+                "write the model by hand",
+            ),
         }
     }
 }

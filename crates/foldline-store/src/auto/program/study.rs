@@ -34,23 +34,42 @@ impl Translation<'_> {
             _ => None,
         };
         match (&given, self.problem, self.data) {
-            (Some(name), 9, _) => self.notes.push(format!("dat = '{name}': the orbit is not needed; it is found from the equilibrium")),
+            (Some(name), 9, _) => {
+                self.notes.push(format!("dat = '{name}': the orbit is not needed; it is found from the equilibrium"))
+            }
             (Some(name), 2, None) => {
-                return stop(0, format!("dat = '{name}': the file {name}.dat is not beside the constants file"), "put it there");
+                return stop(
+                    0,
+                    format!("dat = '{name}': the file {name}.dat is not beside the constants file"),
+                    "put it there",
+                );
             }
             (Some(_), 2, Some(_)) | (None, ..) => {}
             (Some(name), ..) => {
-                return stop(0, format!("dat = '{name}': only cycles can start from a file of data"), "write the study by hand");
+                return stop(
+                    0,
+                    format!("dat = '{name}': only cycles can start from a file of data"),
+                    "write the study by hand",
+                );
             }
         }
-        let reversible = self.constants.get("IREV").is_some_and(|own| own.all().iter().any(|one| one.number() != Some(0.0)));
+        let reversible =
+            self.constants.get("IREV").is_some_and(|own| own.all().iter().any(|one| one.number() != Some(0.0)));
         if self.problem == 9 && reversible {
-            return stop(0, "IREV: half of a reversible homoclinic orbit is sought", "pose it as a boundary-value problem");
+            return stop(
+                0,
+                "IREV: half of a reversible homoclinic orbit is sought",
+                "pose it as a boundary-value problem",
+            );
         }
         let value = |number: usize| values.get(number.wrapping_sub(1)).copied().flatten().unwrap_or(0.0);
         let first = free.iter().copied().find(|k| self.used.contains(k));
         let Some(first) = first else {
-            return stop(0, "none of the parameters in ICP occurs in the equations", "give the constants file of the run");
+            return stop(
+                0,
+                "none of the parameters in ICP occurs in the equations",
+                "give the constants file of the run",
+            );
         };
         if self.problem == 9 && (0..self.n).all(|k| values.get(11 + k).copied().flatten().is_none()) {
             self.notes.push("STPNT does not set the equilibrium PAR(12), …; the study starts at 0".into());
@@ -69,9 +88,15 @@ impl Translation<'_> {
         let here = value(first);
         let (range, whose) = self.range(first, here);
         let [low, high] = range.map(float);
-        let _ = write!(out, "\n[[branch]]\nname = \"branch\"\nfrom = \"start\"\nfree = {name:?}\nrange = [{low}, {high}] # {whose}\n");
+        let _ = write!(
+            out,
+            "\n[[branch]]\nname = \"branch\"\nfrom = \"start\"\nfree = {name:?}\nrange = [{low}, {high}] # {whose}\n"
+        );
         // AUTO follows the branches that cross, too.
-        if matches!(self.problem, 0 | 1 | -1) && self.constants.whole("MXBF", 10) != 0 && self.constants.whole("ISP", 2) > 0 {
+        if matches!(self.problem, 0 | 1 | -1)
+            && self.constants.whole("MXBF", 10) != 0
+            && self.constants.whole("ISP", 2) > 0
+        {
             let _ = writeln!(out, "switch = {{ branch-point = 1 }} # MXBF");
         }
         for (key, own) in [("mark", "UZR"), ("stop", "UZSTOP")] {
@@ -96,7 +121,13 @@ impl Translation<'_> {
             );
             if kind == "heteroclinic" {
                 let to: Option<Vec<String>> = (0..self.n)
-                    .map(|k| values.get(11 + self.n + k).copied().flatten().map(|v| format!("{} = {}", self.states[k], float(v))))
+                    .map(|k| {
+                        values
+                            .get(11 + self.n + k)
+                            .copied()
+                            .flatten()
+                            .map(|v| format!("{} = {}", self.states[k], float(v)))
+                    })
                     .collect();
                 let Some(to) = to else {
                     return stop(0, "IEQUIB: STPNT does not set the second equilibrium", "write the study by hand");
@@ -118,7 +149,11 @@ impl Translation<'_> {
             // Of a connecting orbit, the equilibrium.
             let own = if self.problem == 9 { Some(V::Number(value(12 + k), false)) } else { own.clone() };
             let Some(own) = own else {
-                return stop(0, format!("STPNT does not set U({})", k + 1), "set it there, or as U in the constants file");
+                return stop(
+                    0,
+                    format!("STPNT does not set U({})", k + 1),
+                    "set it there, or as U in the constants file",
+                );
             };
             varies |= !matches!(own, V::Number(..));
             texts.push(own.text(0)?.0);
@@ -172,7 +207,13 @@ impl Translation<'_> {
             let row: Option<Vec<f64>> = line.split_whitespace().take(self.n + 1).map(number).collect();
             match row.filter(|row| row.len() == self.n + 1) {
                 Some(row) => rows.push(row),
-                None => return stop(0, format!("a line of the file of data is not {} numbers: {line}", self.n + 1), "correct the file"),
+                None => {
+                    return stop(
+                        0,
+                        format!("a line of the file of data is not {} numbers: {line}", self.n + 1),
+                        "correct the file",
+                    );
+                }
             }
         }
         let (Some(first), Some(last)) = (rows.first().map(|row| row[0]), rows.last().map(|row| row[0])) else {
@@ -244,13 +285,15 @@ impl Translation<'_> {
                     continue;
                 }
                 if key == "UZR" && !values.is_empty() {
-                    self.notes.push(format!("{key}: values of {} outside the range are left out", self.parameter(number)));
+                    self.notes
+                        .push(format!("{key}: values of {} outside the range are left out", self.parameter(number)));
                 }
                 continue;
             }
             let name = if period { "period".to_string() } else { self.parameter(number).to_string() };
             if !period && !self.used.contains(&number) {
-                self.notes.push(format!("{key}: PAR({number}) does not occur in the equations; its values are not marked"));
+                self.notes
+                    .push(format!("{key}: PAR({number}) does not occur in the equations; its values are not marked"));
                 continue;
             }
             if period && matches!(self.problem, 0 | 1 | -1 | 9) {

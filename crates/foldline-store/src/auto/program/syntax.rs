@@ -49,10 +49,10 @@ pub(super) struct Line {
 pub(super) enum Statement {
     Assign(String, Vec<Place>, X),
     Call(String, Vec<Place>),
-    /// Conditions in turn, each with its statements; without a condition for the last one.
+    /// Conditions, of which the first that holds decides, with their statements; the last part may have no condition.
     If(Vec<(Option<X>, Vec<Line>)>),
     Do(String, X, X, Option<X>, Vec<Line>),
-    /// A name declared, with lower and upper bounds of its indices, a value, and true if it is an integer, if that is said.
+    /// A name declared, with lower and upper bounds of its indices, a value, and its type if it has one: true for an integer.
     Declare(String, Vec<(Option<X>, X)>, Option<X>, Option<bool>),
     Return,
     /// A statement that is not understood.
@@ -78,8 +78,8 @@ pub(super) enum Token {
 }
 
 const SIGNS: [&str; 34] = [
-    "**", "==", "/=", "!=", "<=", ">=", "&&", "||", "(/", "/)", "::", "=>", "+=", "-=", "*=", "++", "--", "->", "+", "-", "*",
-    "/", "(", ")", ",", "=", "<", ">", ":", "[", "]", "%", "!", ".",
+    "**", "==", "/=", "!=", "<=", ">=", "&&", "||", "(/", "/)", "::", "=>", "+=", "-=", "*=", "++", "--", "->", "+",
+    "-", "*", "/", "(", ")", ",", "=", "<", ">", ":", "[", "]", "%", "!", ".",
 ];
 const DOTTED: [(&str, &str); 10] = [
     (".eq.", "=="),
@@ -125,7 +125,11 @@ pub(super) fn tokens(text: &str, line: usize, c: bool) -> Result<Vec<Token>, Sto
         } else {
             let fits = |sign: &&&str| rest.starts_with(**sign) && !(c && matches!(**sign, "(/" | "/)" | "/=" | "**"));
             let Some(sign) = SIGNS.iter().find(fits) else {
-                return stop(line, format!("the character `{here}` is not understood"), "write the statement in another way");
+                return stop(
+                    line,
+                    format!("the character `{here}` is not understood"),
+                    "write the statement in another way",
+                );
             };
             at += sign.len();
             found.push(Token::Sign(if *sign == "/=" { "!=" } else { sign }));
@@ -201,8 +205,7 @@ impl Tokens<'_> {
 
     /// Reads an expression; `level` is the tightness of the operators around it.
     pub(super) fn expression(&mut self, level: usize) -> Result<X, Stop> {
-        const LEVELS: [&[&str]; 5] =
-            [&["||"], &["&&"], &["==", "!=", "<", "<=", ">", ">="], &["+", "-"], &["*", "/"]];
+        const LEVELS: [&[&str]; 5] = [&["||"], &["&&"], &["==", "!=", "<", "<=", ">", ">="], &["+", "-"], &["*", "/"]];
         if level == LEVELS.len() {
             return self.power();
         }
@@ -315,7 +318,8 @@ impl Tokens<'_> {
         let mut all = Vec::new();
         while !self.sign(close) {
             let next = self.list.get(self.at + 1);
-            let unknown = matches!(self.list.get(self.at), Some(Token::Sign("*"))) && matches!(next, Some(Token::Sign("," | ")")));
+            let unknown = matches!(self.list.get(self.at), Some(Token::Sign("*")))
+                && matches!(next, Some(Token::Sign("," | ")")));
             let first = match self.list.get(self.at) {
                 _ if unknown => {
                     self.at += 1;

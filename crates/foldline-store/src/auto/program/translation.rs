@@ -27,7 +27,7 @@ pub struct Program {
     pub model: String,
     /// Text of the study.
     pub study: String,
-    /// What was not translated, or needs attention.
+    /// Parts that were not translated, and parts that need attention.
     pub notes: Vec<String>,
 }
 
@@ -35,9 +35,44 @@ pub struct Program {
 const PARAMETERS: usize = 100;
 /// Names that models use themselves.
 const TAKEN: [&str; 38] = [
-    "sqrt", "cbrt", "exp", "log", "log10", "log2", "expm1", "log1p", "exprel", "sin", "cos", "tan", "asin", "acos", "atan", "atan2",
-    "sinh", "cosh", "tanh", "asinh", "acosh", "atanh", "floor", "ceil", "round", "mod", "abs", "sign", "min", "max", "hypot",
-    "heaviside", "if", "sum", "pi", "t", "period", "norm",
+    "sqrt",
+    "cbrt",
+    "exp",
+    "log",
+    "log10",
+    "log2",
+    "expm1",
+    "log1p",
+    "exprel",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "atan2",
+    "sinh",
+    "cosh",
+    "tanh",
+    "asinh",
+    "acosh",
+    "atanh",
+    "floor",
+    "ceil",
+    "round",
+    "mod",
+    "abs",
+    "sign",
+    "min",
+    "max",
+    "hypot",
+    "heaviside",
+    "if",
+    "sum",
+    "pi",
+    "t",
+    "period",
+    "norm",
 ];
 
 pub(super) struct Translation<'r> {
@@ -87,12 +122,18 @@ pub(super) fn translated(
     match problem {
         0 | 1 | 2 | -1 | -2 | 4 | 7 | 9 => {}
         5 | 15 => {
-            return stop(0, format!("IPS = {problem} optimises a functional, which is not translated"),
-                "make the functional a parameter and follow its extrema: see the chapter on design questions");
+            return stop(
+                0,
+                format!("IPS = {problem} optimises a functional, which is not translated"),
+                "make the functional a parameter and follow its extrema: see the chapter on design questions",
+            );
         }
         11 | 12 | 14 | 16 | 17 => {
-            return stop(0, format!("IPS = {problem} is a parabolic equation or its waves, which is not translated"),
-                "steady profiles and waves are boundary-value problems or cycles; motion in time needs states on a grid");
+            return stop(
+                0,
+                format!("IPS = {problem} is a parabolic equation or its waves, which is not translated"),
+                "steady profiles and waves are boundary-value problems or cycles; motion in time needs states on a grid",
+            );
         }
         _ => return stop(0, format!("IPS = {problem} is not translated"), supported),
     }
@@ -102,7 +143,8 @@ pub(super) fn translated(
     };
     let (mut taken, mut states, mut parameters) = (Vec::new(), Vec::new(), Vec::new());
     let [own, others] = ["unames", "parnames"].map(|key| constants.names(key));
-    let find = |all: &[(usize, String)], number: usize| all.iter().find(|(k, _)| *k == number).map(|(_, name)| name.clone());
+    let find =
+        |all: &[(usize, String)], number: usize| all.iter().find(|(k, _)| *k == number).map(|(_, name)| name.clone());
     for k in 1..=n {
         states.push(named(find(&own, k).as_ref(), format!("u{k}"), &taken));
         taken.push(states[k - 1].clone());
@@ -111,7 +153,19 @@ pub(super) fn translated(
         parameters.push(named(find(&others, k).as_ref(), format!("p{k}"), &taken));
         taken.push(parameters[k - 1].clone());
     }
-    let mut own = Translation { c, constants, routines, problem, n, states, parameters, used: Vec::new(), angles: Vec::new(), data, notes: Vec::new() };
+    let mut own = Translation {
+        c,
+        constants,
+        routines,
+        problem,
+        n,
+        states,
+        parameters,
+        used: Vec::new(),
+        angles: Vec::new(),
+        data,
+        notes: Vec::new(),
+    };
     own.program(title, model_file)
 }
 
@@ -122,10 +176,21 @@ impl<'r> Translation<'r> {
 
     fn machine(&self) -> Machine<'r> {
         let mut machine = Machine::new(self.routines);
-        machine.taken = TAKEN.iter().map(|name| (*name).to_string()).chain(self.states.clone()).chain(self.parameters.clone()).collect();
+        machine.taken = TAKEN
+            .iter()
+            .map(|name| (*name).to_string())
+            .chain(self.states.clone())
+            .chain(self.parameters.clone())
+            .collect();
         let c = self.constants;
         // Variables of the common block of HomCont.
-        let block = [("iequib", "IEQUIB", 1), ("istart", "ISTART", 5), ("itwist", "ITWIST", 0), ("nunstab", "NUNSTAB", -1), ("nstab", "NSTAB", -1)];
+        let block = [
+            ("iequib", "IEQUIB", 1),
+            ("istart", "ISTART", 5),
+            ("itwist", "ITWIST", 0),
+            ("nunstab", "NUNSTAB", -1),
+            ("nstab", "NSTAB", -1),
+        ];
         machine.outside.extend(block.map(|(own, key, usual)| (own.to_string(), V::whole(c.whole(key, usual)))));
         let counts = [("nrev", "IREV"), ("nfixed", "IFIXED"), ("npsi", "IPSI")];
         machine.outside.extend(counts.map(|(own, key)| {
@@ -178,13 +243,19 @@ impl<'r> Translation<'r> {
         let (values, start) = self.start(V::name("t"))?;
         let mut texts: Vec<&String> = equations.iter().chain(&conditions).chain(&integrals).collect();
         texts.extend(definitions.iter().map(|(_, text)| text));
-        let mut used: Vec<usize> = (1..=PARAMETERS).filter(|k| texts.iter().any(|text| mentions(text, self.parameter(*k)))).collect();
+        let mut used: Vec<usize> =
+            (1..=PARAMETERS).filter(|k| texts.iter().any(|text| mentions(text, self.parameter(*k)))).collect();
         let free: Vec<usize> = self.free().iter().filter_map(|own| self.index(own)).collect();
         let period = |k: &usize| *k == 11 && !self.boundary();
         if used.iter().any(period) && self.problem == 2 {
-            return stop(0, "FUNC uses PAR(11), the period, which is no parameter of a model", "write the equations in unscaled time");
+            return stop(
+                0,
+                "FUNC uses PAR(11), the period, which is no parameter of a model",
+                "write the equations in unscaled time",
+            );
         }
-        let own = free.iter().copied().filter(|k| !period(k) && *k <= self.constants.whole("NPAR", 36).max(36) as usize);
+        let own =
+            free.iter().copied().filter(|k| !period(k) && *k <= self.constants.whole("NPAR", 36).max(36) as usize);
         for k in own.take(if self.boundary() { usize::MAX } else { 2 }) {
             if !used.contains(&k) {
                 used.push(k);
@@ -194,9 +265,15 @@ impl<'r> Translation<'r> {
         self.used = used;
         for name in ["pvls", "fopt"] {
             if let Some(routine) = self.routines.iter().find(|own| own.name == name)
-                && routine.body.iter().any(|line| !matches!(line.what, super::syntax::Statement::Declare(..) | super::syntax::Statement::Return))
+                && routine.body.iter().any(|line| {
+                    !matches!(line.what, super::syntax::Statement::Declare(..) | super::syntax::Statement::Return)
+                })
             {
-                let what = if name == "pvls" { "add what it computes to `[outputs]`" } else { "the functional is not optimised" };
+                let what = if name == "pvls" {
+                    "add what it computes to `[outputs]`"
+                } else {
+                    "the functional is not optimised"
+                };
                 self.notes.push(format!("line {}: {} is not translated; {what}", routine.line, name.to_uppercase()));
             }
         }
@@ -251,7 +328,11 @@ impl<'r> Translation<'r> {
     fn equations(&self) -> Result<(Vec<String>, Vec<(String, String)>), Stop> {
         let mut machine = self.machine();
         let Some(routine) = machine.routine("func") else {
-            return stop(1, "there is no subroutine FUNC", "give an equations file of AUTO, such as NAME.f90 or NAME.c");
+            return stop(
+                1,
+                "there is no subroutine FUNC",
+                "give an equations file of AUTO, such as NAME.f90 or NAME.c",
+            );
         };
         machine.defines = true;
         let f = Variable::array(vec![None; self.n]);
@@ -269,7 +350,11 @@ impl<'r> Translation<'r> {
         let mut texts = Vec::new();
         for (k, value) in f.values().into_iter().enumerate().take(self.n) {
             let Some(value) = value else {
-                return stop(routine.line, format!("FUNC does not set F({})", k + 1), "give the constants file with the right NDIM");
+                return stop(
+                    routine.line,
+                    format!("FUNC does not set F({})", k + 1),
+                    "give the constants file with the right NDIM",
+                );
             };
             texts.push(value.text(routine.line)?.0);
         }
@@ -296,12 +381,25 @@ impl<'r> Translation<'r> {
                 continue;
             }
             let Some(routine) = machine.routine(name) else {
-                return stop(1, format!("there is no subroutine {}", name.to_uppercase()), "give the whole equations file");
+                return stop(
+                    1,
+                    format!("there is no subroutine {}", name.to_uppercase()),
+                    "give the whole equations file",
+                );
             };
             let out = Variable::array(vec![None; number]);
             let before = |why: &'static str| Variable::array(vec![Some(V::Opaque(why)); self.n]);
-            let past = || before("an integral condition uses the solution before (UOLD, UDOT or UPOLD), as phase conditions do; models have none");
-            let mut given = vec![self.whole("NDIM", 2), parameters.clone(), self.icp(), Variable::scalar(Some(V::whole(number as i64)))];
+            let past = || {
+                before(
+                    "an integral condition uses the solution before (UOLD, UDOT or UPOLD), as phase conditions do; models have none",
+                )
+            };
+            let mut given = vec![
+                self.whole("NDIM", 2),
+                parameters.clone(),
+                self.icp(),
+                Variable::scalar(Some(V::whole(number as i64))),
+            ];
             match kind {
                 0 => given.extend([self.symbols(&self.states, "@0"), self.symbols(&self.states, "@1")]),
                 _ => given.extend([self.symbols(&self.states, ""), past(), past(), past()]),
@@ -327,7 +425,11 @@ impl<'r> Translation<'r> {
     pub(super) fn start(&self, time: V) -> Result<(Vec<Option<f64>>, Vec<Option<V>>), Stop> {
         let mut machine = self.machine();
         let Some(routine) = machine.routine("stpnt") else {
-            return stop(1, "there is no subroutine STPNT", "give an equations file of AUTO, such as NAME.f90 or NAME.c");
+            return stop(
+                1,
+                "there is no subroutine STPNT",
+                "give an equations file of AUTO, such as NAME.f90 or NAME.c",
+            );
         };
         let empty = || Variable::array(vec![None; self.n.max(PARAMETERS)]);
         let (u, par) = (empty(), empty());
@@ -341,7 +443,13 @@ impl<'r> Translation<'r> {
         for value in par.values() {
             values.push(match value {
                 Some(V::Number(value, _)) => Some(value),
-                Some(V::Symbol(..)) => return stop(routine.line, "STPNT sets a parameter that is not a number", "set the parameters in the study"),
+                Some(V::Symbol(..)) => {
+                    return stop(
+                        routine.line,
+                        "STPNT sets a parameter that is not a number",
+                        "set the parameters in the study",
+                    );
+                }
                 _ => None,
             });
         }
@@ -377,11 +485,19 @@ impl<'r> Translation<'r> {
             return Ok(Vec::new());
         }
         let Some(more) = conditions.checked_sub(self.n) else {
-            return stop(0, format!("there are {} states and {conditions} conditions", self.n), "at least as many conditions as states are needed");
+            return stop(
+                0,
+                format!("there are {} states and {conditions} conditions", self.n),
+                "at least as many conditions as states are needed",
+            );
         };
         match free.get(1..=more) {
             Some(all) => Ok(all.to_vec()),
-            None => stop(0, format!("ICP has {} parameters, but {} are needed", free.len(), more + 1), "give the constants file of the run"),
+            None => stop(
+                0,
+                format!("ICP has {} parameters, but {} are needed", free.len(), more + 1),
+                "give the constants file of the run",
+            ),
         }
     }
 }
@@ -389,9 +505,7 @@ impl<'r> Translation<'r> {
 /// True if a name occurs in a text as a whole word.
 fn mentions(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    text.match_indices(name).any(|(at, _)| {
-        !text[..at].ends_with(part) && !text[at + name.len()..].starts_with(part)
-    })
+    text.match_indices(name).any(|(at, _)| !text[..at].ends_with(part) && !text[at + name.len()..].starts_with(part))
 }
 
 /// A number in TOML.
@@ -399,4 +513,3 @@ pub(super) fn float(value: f64) -> String {
     let text = written(value);
     if text.contains(['.', 'e']) || text.len() < 15 { text } else { format!("{value:e}") }
 }
-

@@ -40,7 +40,9 @@ impl V {
     /// Text in the language of models.
     pub(super) fn text(&self, line: usize) -> Result<(String, Tight), Stop> {
         match self {
-            V::Number(value, _) if !value.is_finite() => stop(line, "a number is not finite here", "correct the constants"),
+            V::Number(value, _) if !value.is_finite() => {
+                stop(line, "a number is not finite here", "correct the constants")
+            }
             V::Number(value, _) => {
                 let text = written(*value);
                 let tight = if *value < 0.0 { Tight::Minus } else { Tight::Atom };
@@ -76,8 +78,12 @@ pub(super) fn binary(sign: &str, left: V, right: V, line: usize) -> Result<V, St
             let pairs = a.into_iter().zip(b);
             Ok(V::List(pairs.map(|(a, b)| binary(sign, a, b, line)).collect::<Result<_, _>>()?))
         }
-        (V::List(a), b) => Ok(V::List(a.into_iter().map(|a| binary(sign, a, b.clone(), line)).collect::<Result<_, _>>()?)),
-        (a, V::List(b)) => Ok(V::List(b.into_iter().map(|b| binary(sign, a.clone(), b, line)).collect::<Result<_, _>>()?)),
+        (V::List(a), b) => {
+            Ok(V::List(a.into_iter().map(|a| binary(sign, a, b.clone(), line)).collect::<Result<_, _>>()?))
+        }
+        (a, V::List(b)) => {
+            Ok(V::List(b.into_iter().map(|b| binary(sign, a.clone(), b, line)).collect::<Result<_, _>>()?))
+        }
         (V::Opaque(why), _) | (_, V::Opaque(why)) => Ok(V::Opaque(why)),
         (V::Logical(a), V::Logical(b)) => match sign {
             "&&" => Ok(V::Logical(a && b)),
@@ -159,7 +165,7 @@ pub(super) fn negative(value: V, line: usize) -> Result<V, Stop> {
 type Function = (&'static [&'static str], &'static str, fn(f64) -> f64);
 const FUNCTIONS: [Function; 14] = [
     (&["exp", "dexp"], "exp", f64::exp),
-    (&["log", "dlog", "alog"], "log", f64::ln),
+    (&["log", "dlog"], "log", f64::ln),
     (&["log10", "dlog10"], "log10", f64::log10),
     (&["sqrt", "dsqrt"], "sqrt", f64::sqrt),
     (&["sin", "dsin"], "sin", f64::sin),
@@ -181,13 +187,16 @@ pub(super) fn intrinsic(name: &str, given: &[V], line: usize) -> Result<Option<V
             V::Number(value, _) => V::Number(f(*value), false),
             V::Opaque(why) => V::Opaque(why),
             V::List(all) => {
-                let each = all.iter().map(|one| intrinsic(name, std::slice::from_ref(one), line).map(Option::unwrap_or_default));
+                let each = all
+                    .iter()
+                    .map(|one| intrinsic(name, std::slice::from_ref(one), line).map(Option::unwrap_or_default));
                 V::List(each.collect::<Result<_, _>>()?)
             }
             other => V::Symbol(format!("{own}({})", other.text(line)?.0), Tight::Atom),
         }));
     }
-    let numbers: Option<Vec<f64>> = given.iter().map(|v| if let V::Number(v, _) = v { Some(*v) } else { None }).collect();
+    let numbers: Option<Vec<f64>> =
+        given.iter().map(|v| if let V::Number(v, _) = v { Some(*v) } else { None }).collect();
     let integers = given.iter().all(|v| matches!(v, V::Number(_, true)));
     let two = |own: &str, f: fn(f64, f64) -> f64| -> Result<V, Stop> {
         if let Some(numbers) = &numbers {
@@ -230,7 +239,11 @@ pub(super) fn intrinsic(name: &str, given: &[V], line: usize) -> Result<Option<V
         }
         ("getp", _) => V::Opaque("GETP gives data of AUTO's own, which have no counterpart in a model"),
         ("mod" | "sign" | "int" | "nint", _) => {
-            return stop(line, format!("`{name}` of states or parameters is not translated"), "write the model by hand");
+            return stop(
+                line,
+                format!("`{name}` of states or parameters is not translated"),
+                "write the model by hand",
+            );
         }
         _ => return Ok(None),
     }))
