@@ -161,11 +161,14 @@ demos! {
     wav,
 }
 
+/// A repeated state: its name, its values over the interval from 0 to 1, and the number of its elements.
+type Profile<'f> = (&'f str, &'f dyn Fn(f64) -> f64, usize);
+
 /// Value of an output at a time, from values of the elements of states at time 0.
-fn in_time(model: &str, start: &[(&str, &dyn Fn(f64) -> f64, usize)], time: f64, output: &str) -> f64 {
+fn in_time(model: &str, start: &[Profile], time: f64, output: &str) -> f64 {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../studies/auto/models/{model}.toml"));
     let folder = tempfile::tempdir().unwrap();
-    let state = |(name, value, n): &(&str, &dyn Fn(f64) -> f64, usize)| {
+    let state = |(name, value, n): &Profile| {
         let all = (1..=*n).map(|i| format!("{name}[{i}]={}", value(i as f64 / (*n + 1) as f64)));
         all.collect::<Vec<String>>().join(",")
     };
@@ -192,11 +195,10 @@ fn motions_in_time_are_those_to_which_auto_tends_with_its_step() {
     use std::f64::consts::PI;
     let wave = |x: f64| (PI * x).sin();
     // Largest u, or root mean square of u where the largest value hardly moves.
-    let brusselator: [(&str, &dyn Fn(f64) -> f64, usize); 2] =
-        [("x", &|x| 2.0 - 0.5 * wave(x), 49), ("y", &|x| 2.725 + 0.7 * wave(x), 49)];
+    let brusselator: [Profile; 2] = [("x", &|x| 2.0 - 0.5 * wave(x), 49), ("y", &|x| 2.725 + 0.7 * wave(x), 49)];
     tends_to(in_time("bru", &brusselator, 24.0, "middle"), [3.0856168131, 3.1543718113, 3.1878046450]);
     tends_to(in_time("pd1-time", &[("u", &wave, 199)], 2.0, "size"), [0.86647929875, 0.86657250300, 0.86661834210]);
-    let two: [(&str, &dyn Fn(f64) -> f64, usize); 2] = [("u", &wave, 49), ("w", &|_| 1.0, 49)];
+    let two: [Profile; 2] = [("u", &wave, 49), ("w", &|_| 1.0, 49)];
     tends_to(in_time("pd2-time", &two, 1.0, "middle"), [0.16179847999, 0.16133435730, 0.16111011896]);
 }
 

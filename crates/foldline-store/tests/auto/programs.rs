@@ -44,12 +44,11 @@ fn loops_functions_and_integers_of_fortran_become_plain_equations() {
             "k = 3.141592653589793 # PAR(1)",
             "w = \"k*exp(-u1)\"",
             "w_v3 = \"k*exp(-u3)\"",
-            "rate_1 = \"w - u1/3\"",
-            "u1 = \"rate_1 - 0.5*(u1 - u2) + u2*(1 - u2)^2\"",
-            "u3 = \"rate_3 - 0.5*(u3 - u1)\"",
+            "r_v3 = \"w_v3 - u3/3\"",
+            "u1 = \"r - 0.5*(u1 - u2) + u2*(1 - u2)^2\"",
+            "u3 = \"r_v3 - 0.5*(u3 - u1)\"",
         ],
     );
-    // The start lies outside the range of the constants, whose upper bound is below it.
     has(&found.study, &["state = { u1 = 0.5, u2 = 0, u3 = -1 }", "free = \"k\"", "mark = { k = [0.5, 1.5] }"]);
 }
 
@@ -69,7 +68,7 @@ fn boundary_value_problems_keep_conditions_integrals_and_determined_parameters()
         &found.model,
         &[
             "solve = [\"p2\"]",
-            "u2 = \"-p1*exp(temp) + p2\"",
+            "u2 = \"-(p1*exp(temp)) + p2\"",
             "condition_2 = \"temp@1 - p3*u2@0^2\"",
             "condition_1 = \"temp - 0.25\"",
         ],

@@ -277,7 +277,7 @@ fn declarations(mut own: Tokens, text: &str) -> Result<Vec<Statement>, Stop> {
         _ => None,
     };
     let mut found = Vec::new();
-    while !own.done() && !(parameter && own.sign(")")) {
+    while !(own.done() || parameter && own.sign(")")) {
         let Some(name) = own.word() else { return Ok(vec![Statement::Other(text.to_string())]) };
         let bounds = if own.sign("(") { shape(own.places(")")?) } else { common.clone() };
         let value = if own.sign("=") { Some(own.expression(0)?) } else { None };

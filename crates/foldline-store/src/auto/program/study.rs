@@ -93,7 +93,7 @@ impl Translation<'_> {
             "\n[[branch]]\nname = \"branch\"\nfrom = \"start\"\nfree = {name:?}\nrange = [{low}, {high}] # {whose}\n"
         );
         // AUTO follows the branches that cross, too.
-        if matches!(self.problem, 0 | 1 | -1)
+        if (-1..=1).contains(&self.problem)
             && self.constants.whole("MXBF", 10) != 0
             && self.constants.whole("ISP", 2) > 0
         {
@@ -141,7 +141,7 @@ impl Translation<'_> {
     fn seed(&mut self, out: &mut String, start: &[Option<V>], value: &dyn Fn(usize) -> f64) -> Result<(), Stop> {
         let _ = write!(out, "\n[[seed]]\nname = \"start\"\n");
         if let (Some(data), 2) = (self.data, self.problem) {
-            return self.from_data(out, data, value);
+            return self.cycle_of_data(out, data, value);
         }
         let mut texts = Vec::new();
         let mut varies = false;
@@ -200,7 +200,7 @@ impl Translation<'_> {
     }
 
     /// A cycle from a file with a column of times and one for each state.
-    fn from_data(&mut self, out: &mut String, data: &str, value: &dyn Fn(usize) -> f64) -> Result<(), Stop> {
+    fn cycle_of_data(&mut self, out: &mut String, data: &str, value: &dyn Fn(usize) -> f64) -> Result<(), Stop> {
         let number = |text: &str| text.replace(['d', 'D'], "e").parse::<f64>().ok().filter(|value| value.is_finite());
         let mut rows: Vec<Vec<f64>> = Vec::new();
         for line in data.lines().filter(|line| !line.trim().is_empty()) {

@@ -31,6 +31,11 @@ pub struct Program {
     pub notes: Vec<String>,
 }
 
+/// Names and texts of definitions.
+type Definitions = Vec<(String, String)>;
+/// Values of the parameters and of the states, as far as they are set.
+type Beginning = (Vec<Option<f64>>, Vec<Option<V>>);
+
 /// Number of parameters that AUTO has at least.
 const PARAMETERS: usize = 100;
 /// Names that models use themselves.
@@ -325,7 +330,7 @@ impl<'r> Translation<'r> {
         Ok(Program { model, study, notes: std::mem::take(&mut self.notes) })
     }
 
-    fn equations(&self) -> Result<(Vec<String>, Vec<(String, String)>), Stop> {
+    fn equations(&self) -> Result<(Vec<String>, Definitions), Stop> {
         let mut machine = self.machine();
         let Some(routine) = machine.routine("func") else {
             return stop(
@@ -422,7 +427,7 @@ impl<'r> Translation<'r> {
     }
 
     /// Values of the parameters, and the states, at a value or as functions of the independent variable.
-    pub(super) fn start(&self, time: V) -> Result<(Vec<Option<f64>>, Vec<Option<V>>), Stop> {
+    pub(super) fn start(&self, time: V) -> Result<Beginning, Stop> {
         let mut machine = self.machine();
         let Some(routine) = machine.routine("stpnt") else {
             return stop(
