@@ -629,7 +629,8 @@ pub enum ExportFormat {
 
 #[derive(Debug, Args)]
 pub struct ImportAuto {
-    /// AUTO files s.NAME; b.NAME and c.NAME, given or in the same folder, supply the names of states and parameters
+    /// AUTO files s.NAME; b.NAME and c.NAME, given or in the same folder, supply the names of states and parameters. Or an equations
+    /// file NAME.f90, NAME.f or NAME.c with c.NAME, given or in the same folder, which become a model and a study
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
     /// Model with the same equations; without it, the solutions are only listed
@@ -644,8 +645,8 @@ pub struct ImportAuto {
     /// Names of AUTO's states in the model, where neither the files nor the order gives them
     #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
     pub states: Vec<String>,
-    /// Study to write [default: NAME.toml, for the first s.NAME]
-    #[arg(short, long = "output", value_name = "STUDY.toml", requires = "model")]
+    /// Study to write [default: NAME.toml]; a model goes to NAME-model.toml beside it
+    #[arg(short, long = "output", value_name = "STUDY.toml")]
     pub output: Option<PathBuf>,
 }
 

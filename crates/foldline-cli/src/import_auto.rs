@@ -1,11 +1,14 @@
-//! `foldline import-auto`: solutions from AUTO-07p files as a table, or as a study that starts from them.
+//! `foldline import-auto`: solutions from AUTO-07p files as a table, or as a study that starts from them; equations and constants
+//! as a model and a study.
 
 use crate::arguments::{Format, ImportAuto as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::table::{Cell, Column, Style, Table, write as write_table};
 use crate::verbosity::report;
-use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, read_solutions, study};
-use foldline_store::model_file::read_model;
+use foldline_store::auto::{
+    Chosen, Complaint, Labelled, Mapping, Names, Text, data_of, program, read_solutions, study,
+};
+use foldline_store::model_file::{parse_model, read_model};
 use foldline_store::study_file::parse_study;
 use std::io::stdout;
 use std::path::{Path, PathBuf};
@@ -19,6 +22,15 @@ struct Source {
 
 /// Lists the solutions, or writes a study.
 pub fn answer(typed: &Typed) -> Result<Outcome, Failure> {
+    if let Some(file) = typed.files.iter().find(|file| is_program(file)) {
+        return translated(typed, file);
+    }
+    if typed.output.is_some() && typed.model.is_none() {
+        return Err(Failure::typed(
+            "--output needs --model, the model with the same equations",
+            "give the model, or the equations file",
+        ));
+    }
     let sources = sources(&typed.files)?;
     let chosen = chosen(&sources, &typed.label)?;
     match &typed.model {
@@ -29,6 +41,68 @@ pub fn answer(typed: &Typed) -> Result<Outcome, Failure> {
             Ok(Outcome::Done)
         }
     }
+}
+
+/// True for an equations file.
+fn is_program(file: &Path) -> bool {
+    let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    ["f90", "f95", "f", "for", "c"].contains(&ending.as_str()) && !begins(file, &["c.", "b.", "s."])
+}
+
+/// Writes the model and the study of an equations file and the constants of a run.
+fn translated(typed: &Typed, file: &Path) -> Result<Outcome, Failure> {
+    let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let beside = file.with_file_name(format!("c.{name}"));
+    let constants = match typed.files.iter().find(|file| begins(file, &["c."])) {
+        Some(given) => given.clone(),
+        None if beside.exists() => beside,
+        None => {
+            let message = format!("the constants file {} does not exist", beside.display());
+            return Err(Failure::typed(
+                message,
+                "give the constants of the first run after the equations, such as c.NAME.1",
+            ));
+        }
+    };
+    let read = |file: &Path| {
+        std::fs::read(file).map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).map_err(|error| {
+            Failure::typed(format!("cannot read {}: {error}", file.display()), "check the spelling of the path")
+        })
+    };
+    let (text, values) = (read(file)?, read(&constants)?);
+    let data = data_of(&values).and_then(|name| read(&constants.with_file_name(name)).ok());
+    let output = typed.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}.toml")));
+    let stem = output.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let model = output.with_file_name(format!("{stem}-model.toml"));
+    for own in [&output, &model] {
+        if own.exists() && typed.output.is_none() {
+            let cure = "give the name of the study with `--output`; existing files of that name are overwritten";
+            return Err(Failure::typed(format!("{} already exists", own.display()), cure));
+        }
+    }
+    let [shown, named] = [file, &constants].map(|own| own.display().to_string());
+    let model_name = model.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let found = program(
+        Text { file: &shown, text: &text },
+        Text { file: &named, text: &values },
+        data.as_deref(),
+        [&name, &model_name],
+    )?;
+    // Reads both back: a mistake in them should be reported now, not when they are run.
+    let [own, other] = [&model, &output].map(|path| format!("{} (translated, not written)", path.display()));
+    parse_model(&found.model, &own)?;
+    parse_study(&found.study, &other, &found.model, &own)?;
+    for (path, text) in [(&model, &found.model), (&output, &found.study)] {
+        std::fs::write(path, text).map_err(|error| {
+            Failure::typed(format!("cannot write {}: {error}", path.display()), "choose a file in a writable folder")
+        })?;
+    }
+    for note in &found.notes {
+        report(format_args!("note: {note}"))?;
+    }
+    report(format_args!("wrote {} and {}", model.display(), output.display()))?;
+    report(format_args!("next: compare the model with the equations, then foldline run {}", output.display()))?;
+    Ok(Outcome::Done)
 }
 
 /// Files of solutions, with names from the files given or from those in the same folder.

@@ -1,7 +1,7 @@
 //! Curves of branch points of equilibria in two parameters, against closed forms.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, SpecialPoint};
 use foldline::explore::{System, run};
 use foldline::verify::verify;
 use foldline_store::study_file::{Study, parse_study};
@@ -251,4 +251,45 @@ fn a_crossing_for_an_isolated_value_is_followed_in_three_parameters() {
     let two = grown(model, &format!("{seed}{PLAN}range = [0.5, 1.5]\n"));
     let end = two.branch("curve").unwrap().ends[0].clone();
     assert!(matches!(&end, Some(Ending::NoStart(why)) if why.contains("only for this value")), "{end:?}");
+}
+
+/// On the unit sphere in five dimensions the largest sum of k coordinates is √k, where they are equal.
+#[test]
+fn the_largest_sum_of_coordinates_is_followed_from_two_of_them_to_five() {
+    let model = "[parameters]\ns = 1\nx3 = 0\nx4 = 0\nx5 = 0\n[definitions]\nx1 = \"s - x2 - x3 - x4 - x5\"\n[states]\n\
+        x2 = \"x1^2 + x2^2 + x3^2 + x4^2 + x5^2 - 1\"\n";
+    let curve = |name: &str, of: &str, free: &str| {
+        format!(
+            "[[curve]]\nname = \"{name}\"\nhold = \"branch-point\"\nof = \"{of}\"\nfree = \"{free}\"\nrange = [-2, 2]\n"
+        )
+    };
+    let start = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = { x2 = 0 }\n[[branch]]\nname = \"two\"\nfrom = \"s\"\nfree = \"s\"\n\
+        until = 1.3\n[[branch]]\nname = \"circle\"\nfrom = \"two\"\nfree = \"x3\"\nrange = [-2, 2]\n[[curve]]\nname = \"three\"\n\
+        hold = \"fold\"\nof = \"circle\"\nfree = \"s\"\nrange = [0.5, 3]\n";
+    let all = format!("{start}{}{}", curve("four", "three", "x4"), curve("five", "four", "x5"));
+    let diagram = grown(model, &all);
+    for (name, kind, k) in [("three", Kind::Fold, 3.0f64), ("four", Kind::Peak, 4.0), ("five", Kind::Peak, 5.0)] {
+        let branch = diagram.branch(name).unwrap();
+        let found: Vec<&SpecialPoint> = branch.special.iter().filter(|special| special.kind == kind).collect();
+        assert_eq!(found.len(), 1, "{name}");
+        let [s, rest @ ..] = &found[0].point.parameters[..] else { panic!() };
+        let error = found[0].error.max(1e-9) * (1.0 + s.abs());
+        assert!((s - k.sqrt()).abs() <= error, "{name}: {s} ± {error:e}");
+        // Coordinates beyond the k-th are fixed at 0.
+        for (i, x) in rest.iter().enumerate() {
+            let known = if i + 3 <= k as usize { 1.0 / k.sqrt() } else { 0.0 };
+            assert!((x - known).abs() < 1e-7, "{name}: x{} = {x}", i + 3);
+        }
+    }
+    // Along the curves the coordinates that are solved for are equal: s is extremal over them.
+    for point in &diagram.branch("five").unwrap().points {
+        let [s, x3, x4, x5] = point.parameters[..] else { panic!() };
+        let on_sphere = 4.0 * x3 * x3 + x5 * x5 - 1.0;
+        let equal = (x3 - x4).abs().max((s - 4.0 * x3 - x5).abs());
+        assert!(equal < 1e-7 && on_sphere.abs() < 1e-7, "{s} {x3} {x4} {x5}");
+    }
+    // A curve without an extremum starts no other one, and says so.
+    let none = start.replace("range = [0.5, 3]", "range = [0.5, 1.5]") + &curve("four", "three", "x4");
+    let end = grown(model, &none).branch("four").unwrap().ends[0].clone();
+    assert!(matches!(&end, Some(Ending::NoStart(why)) if why.contains("the branch three has no extremum")), "{end:?}");
 }

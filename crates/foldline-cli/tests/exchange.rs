@@ -71,6 +71,32 @@ fn branches_started_from_auto_match_those_found_without_it() {
 }
 
 #[test]
+fn an_equations_file_of_auto_gives_the_special_points_of_the_own_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let own = format!(
+        "model = {MODEL:?}\nseed = [{{ name = \"rest\", state = {{ u1 = 0, u2 = 0 }}, parameters = {{ p1 = 0 }} }}]\n\
+         [[branch]]\nname = \"branch\"\nfrom = \"rest\"\nfree = \"p1\"\nrange = [0, 0.4]\n"
+    );
+    std::fs::write(here.join("own.toml"), own).unwrap();
+    foldline(here, &["run", "own.toml", "--out", "own"]);
+    // The constants are found beside the equations.
+    let made = foldline(here, &["import-auto", &auto("ab.f90"), "-o", "ab.toml"]);
+    assert_eq!(made.status.code(), Some(0), "{}", said(&made));
+    assert!(said(&made).contains("wrote ab-model.toml and ab.toml"), "{}", said(&made));
+    let run = foldline(here, &["run", "ab.toml", "--out", "run"]);
+    assert_eq!(run.status.code(), Some(0), "{}", said(&run));
+    let expected = special(here, "own");
+    assert_eq!(expected.len(), 3);
+    same(&special(here, "run"), &expected);
+    // Nothing is overwritten unless it is named.
+    let again = foldline(here, &["import-auto", &auto("ab.f90")]);
+    assert!(again.status.code() == Some(2) && said(&again).contains("already exists"), "{}", said(&again));
+    let alone = foldline(here, &["import-auto", &auto("ab.f90"), &auto("c.none")]);
+    assert!(alone.status.code() == Some(2) && said(&alone).contains("cannot read"), "{}", said(&alone));
+}
+
+#[test]
 fn solutions_in_auto_files_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let listed = foldline(folder.path(), &["import-auto", &auto("s.ab"), &auto("s.ab-cycles")]);

@@ -1,6 +1,8 @@
 //! Every test of this crate that needs no access to its inside, as one program: it is linked once, and all tests share the
 //! processors.
 
+#[path = "auto/main.rs"]
+mod auto;
 mod basins;
 mod designs;
 mod emitted;

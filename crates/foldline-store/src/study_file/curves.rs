@@ -40,12 +40,15 @@ const HELD: [Kind; 10] = [
     Kind::Heteroclinic,
 ];
 
-/// Branch on which the special point lies.
+/// Branch or curve on which the special point lies.
 pub(super) struct Base {
     /// Name in the plan.
     name: String,
-    /// Plan of this branch, or of the branch from which it is reached by branch switching.
+    /// Plan of this branch, or of the branch from which it is reached by branch switching; of a curve, that of the branch on
+    /// which everything began.
     pub(super) plan: BranchPlan,
+    /// Of a curve, its index.
+    curve: Option<usize>,
     pub(super) beginning: Vec<Option<f64>>,
     /// Equilibria or cycles, if known.
     pub(super) family: Option<Family>,
@@ -75,11 +78,16 @@ pub(super) fn read(
         walk.report(value.span(), message, "fold, period-doubling or torus");
     }
     let first = base.as_ref().map(|base| &ground.model.parameters[base.plan.free]);
-    let branch_range = branch_range(walk, item, base.as_ref(), first);
-    let near = near(walk, item, branch_range, first);
+    let curve = base.as_ref().and_then(|base| Some(ground.items.curves[base.curve?].clone()));
+    let branch_range = branch_range(walk, item, base.as_ref(), curve.as_ref(), first);
+    // On a curve the special point is selected by the second parameter of the curve.
+    let near = match &curve {
+        Some(own) => near(walk, item, Some(own.ranges[1]), Some(&ground.model.parameters[own.free])),
+        None => near(walk, item, branch_range, first),
+    };
     let to = to(walk, item, ground, hold, base.as_ref().and_then(|base| base.family));
     let second = second(walk, item, ground, base.as_ref());
-    let third = third(walk, item, ground, hold, [base.as_ref().map(|base| base.plan.free), second]);
+    let further = further(walk, item, ground, hold, base.as_ref(), second);
     let max_points = max_points(walk, item);
     let marks = marks(walk, table, ground.model);
     let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
@@ -107,7 +115,7 @@ pub(super) fn read(
         of: base.name,
         near: near.flatten(),
         to: to?,
-        third: third?,
+        further: further?,
         free,
         ranges: [branch_range, range],
         until,
@@ -137,9 +145,11 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     if let Some((known, rest)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
         return match known.start {
             Start::EndOf(index) => switched(walk, value, of_branch(ground, known, index), known, rest),
+            Start::EndOfCurve(index) if rest.is_empty() => of_curve(walk, item, ground, known, index),
             _ => {
                 let (short, noun) = (&known.name, with_article(noun(&known.start)));
-                let message = format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch");
+                let message =
+                    format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch or a curve");
                 walk.report(
                     value.span(),
                     message,
@@ -161,7 +171,46 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
 
 pub(super) fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
     let plan = ground.items.branches[index].clone();
-    Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family }
+    Base { name: known.name.clone(), plan, curve: None, beginning: known.beginning.clone(), family: known.family }
+}
+
+/// A curve at an extremum of which another one starts, which must be one of folds or of such extrema.
+fn of_curve(walk: &mut Walk, item: &Item, ground: &Ground, known: &Known, index: usize) -> Option<Base> {
+    let curve = &ground.items.curves[index];
+    let value = item.table.get("hold");
+    let points = value.and_then(|value| value.get_ref().as_str()) == Some(Kind::BranchPoint.name());
+    let wrong = match (curve.hold, curve.further.is_empty(), points) {
+        (_, _, false) => Some((
+            format!("\"{}\" is a curve, and curves start on curves only as branch points", known.name),
+            "`hold = \"branch-point\"`, or a branch instead of the curve",
+        )),
+        _ if ground.model.conditions() != [0, 0] => Some((
+            "curves of boundary-value problems are followed in two parameters only".to_string(),
+            "a branch instead of the curve",
+        )),
+        (Kind::Fold, true, _) | (Kind::BranchPoint, false, _) => None,
+        _ => Some((
+            format!("\"{}\" is a curve of kind {}", known.name, curve.hold.name()),
+            "a curve of folds, or one of branch points with `also` or of a curve",
+        )),
+    };
+    if let Some((message, right)) = wrong {
+        let span = value.or(item.table.get("of")).map_or(item.span.clone(), |value| value.span());
+        walk.report(span, message, right);
+        return None;
+    }
+    // The branch on which everything began: the first of the plan from which the name leads here.
+    let mut of = curve;
+    while let Some(below) = ground.items.curves.iter().find(|own| own.name == of.of) {
+        of = below;
+    }
+    let plan = ground
+        .items
+        .branches
+        .iter()
+        .find(|own| of.of.strip_prefix(&own.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')));
+    let (plan, beginning) = (plan?.clone(), known.beginning.clone());
+    Some(Base { name: known.name.clone(), plan, curve: Some(index), beginning, family: known.family })
 }
 
 /// Applies the branch switches `/kind-number` in `steps` to a branch; without steps, returns the branch itself.
@@ -238,8 +287,15 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
 }
 
 /// Reads the range of the branch's free parameter in which the curve is continued.
-fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option<&Parameter>) -> Option<[f64; 2]> {
+fn branch_range(
+    walk: &mut Walk,
+    item: &Item,
+    base: Option<&Base>,
+    curve: Option<&CurvePlan>,
+    first: Option<&Parameter>,
+) -> Option<[f64; 2]> {
     let whole = base.map(|base| base.plan.range);
+    let whole = curve.map(|curve| curve.ranges[0]).or(whole);
     let Some(value) = item.table.get("branch-range") else { return whole };
     let narrow = range(walk, value, first.map_or("", |own| &own.unit))?;
     if let Some([low, high]) = whole.filter(|[low, high]| narrow[1] < *low || narrow[0] > *high) {
@@ -304,15 +360,42 @@ fn to(
     state(walk, value, ground.model).map(Some)
 }
 
-/// Reads the third parameter of a curve of branch points, with its range; `Some(None)` if there is none.
-fn third(
+/// Reads the parameters of a curve beyond the first two, with their ranges: those of the curve on which it starts, or the third
+/// one of a curve of branch points; none for other curves.
+fn further(
     walk: &mut Walk,
     item: &Item,
     ground: &Ground,
     hold: Option<Kind>,
-    taken: [Option<usize>; 2],
-) -> Option<Option<(usize, [f64; 2])>> {
-    let Some(value) = item.table.get("also") else { return Some(None) };
+    base: Option<&Base>,
+    second: Option<usize>,
+) -> Option<Vec<(usize, [f64; 2])>> {
+    let curve = base.and_then(|base| Some(&ground.items.curves[base.curve?]));
+    let Some(value) = item.table.get("also") else {
+        let Some(own) = curve else { return Some(Vec::new()) };
+        let all: Vec<(usize, [f64; 2])> = own.further.iter().copied().chain([(own.free, own.ranges[1])]).collect();
+        if let (Some(index), Some(value)) = (second, item.table.get("free"))
+            && all.iter().any(|(other, _)| *other == index)
+        {
+            let name = &ground.model.parameters[index].name;
+            walk.report(
+                value.span(),
+                format!("{name} is already free along \"{}\"", own.name),
+                "another parameter of the model",
+            );
+            return None;
+        }
+        return Some(all);
+    };
+    let taken = [base.map(|base| base.plan.free), second];
+    if curve.is_some() {
+        walk.report(
+            value.span(),
+            "a curve that starts on a curve has the parameters of that one and its own",
+            "leave out `also`",
+        );
+        return None;
+    }
     let model = ground.model;
     let wrong = match hold {
         Some(Kind::BranchPoint) | None if model.conditions() != [0, 0] => {
@@ -343,7 +426,7 @@ fn third(
         walk.report(key.span(), format!("{name} is free already"), "a third parameter of the model");
         return None;
     }
-    Some(Some((index, range(walk, own, &model.parameters[index].unit)?)))
+    Some(vec![(index, range(walk, own, &model.parameters[index].unit)?)])
 }
 
 /// Reads the second parameter, which must differ from that of the branch.

@@ -1,6 +1,8 @@
 //! Files of AUTO-07p: they are read, mistakes in them are reported, and imported starts give the same branches as our
 //! own.
 
+mod programs;
+
 use foldline::explore::{SeedSource, mismatch};
 use foldline::model::Model;
 use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, solutions, study};

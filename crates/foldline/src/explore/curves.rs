@@ -27,7 +27,13 @@ pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoin
         ));
     }
     let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
-    let fitting = branch.special.iter().filter(|special| special.kind == plan.hold);
+    // From a curve: at an extremum of its second parameter, or of the one that is solved for along it.
+    let kind = match (branch.held, branch.also.is_empty()) {
+        (Some(_), _) => Kind::Fold,
+        (None, false) if branch.levels.is_empty() => Kind::Peak,
+        _ => plan.hold,
+    };
+    let fitting = branch.special.iter().filter(|special| special.kind == kind);
     let found = match plan.near {
         Some(near) => fitting.min_by(|a, b| (value(a) - near).abs().total_cmp(&(value(b) - near).abs())),
         None => fitting.min_by_key(|special| special.point.position),
@@ -35,7 +41,8 @@ pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoin
     found.ok_or_else(|| {
         let others: Vec<String> = branch.special.iter().map(|s| format!("{} {:.6}", s.kind, Shown(value(s)))).collect();
         let there = if others.is_empty() { "none".into() } else { others.join(", ") };
-        format!("the branch {} has no {} point (its special points: {there})", branch.name, plan.hold)
+        let what = if kind == plan.hold { format!("no {kind} point") } else { "no extremum".to_string() };
+        format!("the branch {} has {what} (its special points: {there})", branch.name)
     })
 }
 
@@ -149,9 +156,9 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     let (ending, point) =
         if backward { (&branch.ends[0], branch.points.first()) } else { (&branch.ends[1], branch.points.last()) };
     let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
-    if curve.third.is_some() {
+    if !curve.further.is_empty() {
         return Err(format!(
-            "no branch starts from a curve in three parameters\nlikely cause: {} is one\nwhat to do: start from the branch on which \
+            "no branch starts from a curve in more than two parameters\nlikely cause: {} is one\nwhat to do: start from the branch on which \
              it lies",
             curve.name
         ));

@@ -204,7 +204,7 @@ impl Discovery<'_, '_> {
             of: parent.name.clone(),
             near: None,
             to: None,
-            third: None,
+            further: Vec::new(),
             free: second,
             ranges: [plan.range, range],
             until: None,

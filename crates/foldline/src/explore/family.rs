@@ -9,6 +9,7 @@ use super::{System, arrival, connections, crossings, curves, discovery, holds, h
 use crate::continuation::{Settings, Station};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
+use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
 use std::ops::Range;
 
@@ -243,23 +244,34 @@ impl Work<'_> {
                 Kind::Homoclinic | Kind::Heteroclinic => connections::follow,
                 _ => curves::follow,
             };
-            let (branch, going) = match curve.third {
-                Some(third) => self.in_three_parameters(curve, third, &parent),
-                None => follow(self.system, self.plan, curve, &parent, earlier, self.observer),
+            let (branch, going) = match curve.further.is_empty() {
+                false => self.in_further_parameters(curve, &parent),
+                true => follow(self.system, self.plan, curve, &parent, earlier, self.observer),
             };
             let ended = curves::end_of(self.system, self.plan, curve, &branch);
             self.branches.push(branch);
-            if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
+            let own = self.branches.len() - 1;
+            // Other curves start at the extrema of this one.
+            if !going || !self.curves(own..own + 1) || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
                 return false;
             }
         }
         true
     }
 
-    /// Follows branch points in three parameters.
-    fn in_three_parameters(&self, curve: &CurvePlan, third: (usize, [f64; 2]), parent: &Branch) -> (Branch, bool) {
+    /// Follows branch points in three parameters, or extrema in more.
+    fn in_further_parameters(&self, curve: &CurvePlan, parent: &Branch) -> (Branch, bool) {
         let start = curves::start(curve, parent).map(|special| special.point.clone());
-        let parameter = start.as_ref().map_or(f64::NAN, |point| point.parameters[parent.free]);
+        // The parameter of the branch over which everything began is the first of a curve, or the last of those solved for.
+        let first = parent.held.map(|(_, first)| first).or(parent.also.last().map(|(index, _)| *index));
+        let first = first.unwrap_or(parent.free);
+        let start = start.and_then(|point| match (&point.solution, curve.further.len()) {
+            (Solution::Equilibrium(_), _) | (_, 1) => Ok(point),
+            _ => Err("extrema of cycles are followed in three parameters, those of equilibria in more\nlikely cause: the curve \
+                      starts from one in three parameters\nwhat to do: fix one of the parameters"
+                .to_string()),
+        });
+        let parameter = start.as_ref().map_or(f64::NAN, |point| point.parameters[first]);
         let origin = Origin::Switch { parent: parent.name.clone(), kind: curve.hold, parameter };
         let plan = BranchPlan {
             name: curve.name.clone(),
@@ -268,10 +280,22 @@ impl Work<'_> {
             range: curve.ranges[1],
             until: curve.until,
             switching: Switching::default(),
-            marks: curve.marks.clone(),
+            // An extremum of the parameter that is solved for can be followed in one more parameter.
+            marks: curve
+                .further
+                .first()
+                .map(|own| Mark::peak(Quantity::Parameter(own.0)))
+                .into_iter()
+                .chain(curve.marks.clone())
+                .collect(),
             max_points: curve.max_points,
             holds: Holds {
-                others: vec![(third.0, Some(third.1)), (parent.free, Some(curve.ranges[0]))],
+                others: curve
+                    .further
+                    .iter()
+                    .map(|(index, range)| (*index, Some(*range)))
+                    .chain([(first, Some(curve.ranges[0]))])
+                    .collect(),
                 singular: true,
                 ..Holds::default()
             },

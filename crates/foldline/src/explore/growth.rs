@@ -103,7 +103,7 @@ impl Line {
             Solution::Cycle(cycle) if holds.singular => {
                 Box::new(OnCycleBranchPoints::in_three_parameters(setting, cycle))
             }
-            _ if holds.singular => Box::new(OnBranchPoints::in_three_parameters(setting)),
+            _ if holds.singular => Box::new(OnBranchPoints::in_further_parameters(setting)),
             _ => Box::new(OnLevels::new(setting, &holds.levels, &sizes, &like)),
         };
         Box::new(Held::new(surface, condition, free))
@@ -1045,7 +1045,11 @@ impl Growth<'_> {
         let beside = [branch.points.last(), branch.points.first()].into_iter().flatten();
         let near = beside.min_by_key(|point| (point.position - special.point.position).abs());
         let (Some(here), Some(there)) = (value(&special.point), near.and_then(value)) else { return String::new() };
-        let name = mark.quantity.name(&self.system.channel_names);
+        let name = match mark.quantity {
+            // A table has a column for each parameter.
+            Quantity::Parameter(_) => "value".to_string(),
+            other => other.name(&self.system.channel_names),
+        };
         format!("{} {name} = {}", if here > there { "largest" } else { "smallest" }, significant(here))
     }
 

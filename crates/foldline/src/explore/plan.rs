@@ -145,7 +145,7 @@ pub struct Holds {
     pub others: Vec<(usize, Option<[f64; 2]>)>,
     /// The quantities. A value that is NaN stands for that of the start.
     pub levels: Vec<Level>,
-    /// True if, in place of quantities, the singular points of branches over the second of the further parameters are
+    /// True if, in place of quantities, the singular points of branches over all further parameters but the first are
     /// followed, such as the centres of isolas.
     pub singular: bool,
     /// Value of the parent's parameter next to which the start is sought, where several points of the parent have the
@@ -166,8 +166,9 @@ pub struct CurvePlan {
     pub near: Option<f64>,
     /// A state near the second equilibrium of a connecting orbit that starts from a branch of equilibria.
     pub to: Option<Vec<f64>>,
-    /// A third parameter and its range, for branch points that exist for isolated values of the second one.
-    pub third: Option<(usize, [f64; 2])>,
+    /// Further parameters and their ranges, for branch points that exist for isolated values of the second one: first the
+    /// one that is solved for, then those over which, like that of the branch, branches are singular.
+    pub further: Vec<(usize, [f64; 2])>,
     /// Index of the second parameter; the first is that of the branch.
     pub free: usize,
     /// Smallest and largest value of the branch's parameter, then of the second parameter.

@@ -133,7 +133,7 @@ impl Search<'_> {
                     of: seed.of.clone(),
                     near: None,
                     to: None,
-                    third: None,
+                    further: Vec::new(),
                     free: self.design.vary,
                     ranges: [self.wider(), self.design.within],
                     until: None,
