@@ -30,6 +30,8 @@ pub(super) struct Measured {
     at: Vec<f64>,
     /// `[N]`: errors on the intervals, over all segments.
     time: Vec<f64>,
+    /// First-order change of the unknowns that would remove the error in time.
+    shift: Vec<f64>,
     /// `[harmonics + 1]`: largest modulus of this or a higher harmonic, relative to the scales.
     envelope: Vec<f64>,
 }
@@ -61,7 +63,7 @@ impl Measured {
 }
 
 /// Moduli of the harmonics 0 … (K - 1) / 2 of values `[K]`.
-pub(super) fn harmonics(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(crate) fn harmonics(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<Complex64> = values.map(Complex64::from).collect();
     let count = all.len();
     foldline_general::fourier(&mut all);
@@ -109,13 +111,18 @@ impl TorusProblem<'_> {
         for j in (1..envelope.len()).rev() {
             envelope[j - 1] = larger(envelope[j - 1], envelope[j]);
         }
-        Measured { at: u.to_vec(), time, envelope }
+        Measured { at: u.to_vec(), time, shift, envelope }
     }
 
     /// The stated error at `u`: four times the larger of the estimates in time and in the phase.
     pub(super) fn stated_error(&self, u: &[f64]) -> f64 {
         let most = |known: &Measured| known.time.iter().fold(known.tail(), |most, e| larger(most, *e));
         SAFE * self.measured_at(u, most) + ROUNDING
+    }
+
+    /// `u` without its error in time, to first order.
+    pub(super) fn corrected(&self, u: &[f64]) -> Vec<f64> {
+        self.measured_at(u, |known| u.iter().zip(&known.shift).map(|(u, d)| u - d).collect())
     }
 
     /// See [`ZeroProblem::better_mesh`].

@@ -34,6 +34,7 @@ mod joint;
 pub mod phases;
 mod stability;
 pub mod start;
+pub mod summit;
 mod surface;
 
 use super::cycle::CycleProblem;
@@ -43,6 +44,7 @@ use crate::contract::{Examination, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Symmetry, Torus, Trust};
 use crate::linalg::{all_finite, larger, same};
 pub use errors::LARGEST;
+pub(crate) use errors::harmonics;
 use joint::Joint;
 use std::cell::RefCell;
 
@@ -101,6 +103,16 @@ impl<'a> TorusProblem<'a> {
         };
         problem.set_mesh(&torus.mesh);
         problem
+    }
+
+    /// Segment k on the current mesh.
+    fn segment(&self, k: usize) -> CycleProblem<'a> {
+        let mut setting = self.setting.clone();
+        if let Some(phase) = self.second {
+            setting.parameters[phase] += k as f64 / self.phases as f64;
+        }
+        let rows = self.phase_count() + self.setting.freedom().max(1);
+        CycleProblem::segment(setting, self.scheme.degree, &self.time, self.forcing_periods, rows)
     }
 
     fn intervals(&self) -> usize {
@@ -302,21 +314,16 @@ impl ZeroProblem for TorusProblem<'_> {
             return;
         }
         let (time, count) = (phases::in_time(mesh), phases::count(mesh));
-        let (degree, rows) = (self.scheme.degree, self.phase_count() + 1);
         if self.second.is_some() && count != self.phases {
             self.segments.clear();
         }
+        (self.mesh, self.time, self.phases) = (mesh.clone(), time.clone(), count);
         self.segments.truncate(count);
         self.segments.iter_mut().for_each(|own| own.move_to(&time));
         while self.segments.len() < count {
-            let mut setting = self.setting.clone();
-            if let Some(phase) = self.second {
-                setting.parameters[phase] += self.segments.len() as f64 / count as f64;
-            }
-            let own = CycleProblem::segment(setting, degree, &time, self.forcing_periods, rows);
+            let own = self.segment(self.segments.len());
             self.segments.push(own);
         }
-        (self.mesh, self.time, self.phases) = (mesh.clone(), time, count);
         (self.joint, self.anchored, self.directions) = (None, Vec::new(), Vec::new());
         self.measured.replace(None);
     }
@@ -363,8 +370,8 @@ impl ZeroProblem for TorusProblem<'_> {
         found
     }
 
-    fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
-        self.spectrum_doubt()
+    fn spectrum_error(&mut self, u: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
+        self.spectrum_doubt(u)
     }
 
     fn margin(&self, at: &Point) -> f64 {
