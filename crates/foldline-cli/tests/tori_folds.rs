@@ -44,7 +44,6 @@ fn folds_of_the_bouncing_tori_move_with_gravity_as_computed_one_by_one() {
     let [speed, gravity] = ["Omega", "G"].map(|name| study.model.parameter_index(name).unwrap());
     let curve = diagram.branch("folds").unwrap();
     assert_eq!(curve.family, Family::Torus);
-    eprintln!("{:?} {} {:?}", curve.ends, curve.points.len(), curve.points.iter().map(|p| [p.parameters[gravity], p.parameters[speed]]).collect::<Vec<_>>());
     assert_eq!(curve.ends, [Some(Ending::Bound(0.01)), Some(Ending::Bound(0.2))]);
     // tori.csv, A3-fold-SL-lower-0.05.
     let known = fold(diagram.branch("at 0.05").unwrap()).parameters[speed];
@@ -65,11 +64,32 @@ fn folds_of_the_response_to_two_tones_end_in_a_cusp() {
         "duffing-two-tones",
         "[[seed]]\nname = \"both\"\nattractor = \"torus\"\n\
          [[branch]]\nname = \"tori\"\nfrom = \"both\"\nfree = \"eta\"\nrange = [1.3, 2.1]\nmax-points = 60\n\
-         [[curve]]\nname = \"folds\"\nof = \"tori\"\nhold = \"fold\"\nfree = \"delta\"\nrange = [0.08, 0.8]\nbranch-range = [0.5, 3]\n",
+         [[branch]]\nname = \"to 0.27\"\nfrom = \"both\"\nfree = \"delta\"\nuntil = 0.27\n\
+         [[branch]]\nname = \"to 0.3\"\nfrom = \"both\"\nfree = \"delta\"\nuntil = 0.3\n\
+         [[branch]]\nname = \"at 0.27\"\nfrom = \"to 0.27\"\nfree = \"eta\"\nrange = [1.2, 2.1]\n\
+         [[branch]]\nname = \"at 0.3\"\nfrom = \"to 0.3\"\nfree = \"eta\"\nrange = [1.2, 2.1]\n\
+         [[curve]]\nname = \"folds\"\nof = \"tori\"\nhold = \"fold\"\nfree = \"delta\"\nrange = [0.08, 0.8]\nbranch-range = [0.5, 3]\nmark = { delta = [0.27] }\n",
     );
+    let [damping, frequency] = ["delta", "eta"].map(|name| study.model.parameter_index(name).unwrap());
     let curve = diagram.branch("folds").unwrap();
-    eprintln!("{:?} {:?}", study.model.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>(), curve.ends);
-    for p in &curve.points { eprintln!("{:?}", p.parameters); }
-    for s in &curve.special { eprintln!("{:?} {:?}", s.kind, s.point.parameters); }
-    assert!(curve.special.iter().any(|special| special.kind == Kind::Cusp));
+    let cusps: Vec<&Point> = curve.special.iter().filter(|s| s.kind == Kind::Cusp).map(|s| &s.point).collect();
+    let [cusp] = cusps[..] else { panic!("{:?}", curve.ends) };
+    // The folds of branches at two values of the damping, on either side of the cusp.
+    let folds = |name: &str| -> Vec<&Point> {
+        let branch = diagram.branch(name).unwrap();
+        let own = branch.special.iter().filter(|special| special.kind == Kind::Fold).map(|special| &special.point);
+        own.filter(|point| (1.2..1.45).contains(&point.parameters[frequency])).collect()
+    };
+    assert!(cusp.parameters[damping] > 0.27 && cusp.parameters[damping] < 0.3, "{:?}", cusp.parameters);
+    assert_eq!([folds("at 0.27").len(), folds("at 0.3").len()], [2, 0]);
+    let marked = curve.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| &s.point);
+    let mut marked: Vec<f64> = marked.map(|point| point.parameters[frequency]).collect();
+    let mut alone: Vec<f64> = folds("at 0.27").iter().map(|point| point.parameters[frequency]).collect();
+    marked.sort_by(f64::total_cmp);
+    alone.sort_by(f64::total_cmp);
+    assert_eq!(marked.len(), 2);
+    for (a, b) in marked.iter().zip(&alone) {
+        // The tolerance of the study, on both sides.
+        assert!((a - b).abs() < 2e-6 * (1.0 + b), "{a} {b}");
+    }
 }

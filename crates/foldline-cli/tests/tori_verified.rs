@@ -60,18 +60,19 @@ fn tori_of_a_forced_oscillator_are_verified_and_changes_to_them_are_detected() {
         diagram.branches[at].points = vec![diagram.branches[at].points[middle].clone()];
         diagram.branches[at].ends = [None, None];
         let found = verified(&study, &diagram, "c/torus-1", 1);
-        found.wrong().next().map(|check| check.quantity)
+        assert_eq!(found.points, 1, "{:?}", found.undecided);
+        found.wrong().map(|check| check.quantity).collect::<Vec<Quantity>>()
     };
     let torus = |diagram: &mut Diagram, change: &dyn Fn(&mut Torus)| {
         if let Solution::Torus(torus) = &mut diagram.branches[at].points[middle].solution {
             change(torus);
         }
     };
-    assert_eq!(worst(&|_| ()), None);
-    assert_eq!(worst(&|d| torus(d, &|t| t.rotation += 1e-4)), Some(Quantity::Rotation));
-    assert_eq!(worst(&|d| torus(d, &|t| t.profile.iter_mut().skip(40).take(1).for_each(|x| *x += 1e-2))), Some(Quantity::Profile));
-    assert_eq!(worst(&|d| d.branches[at].points[middle].ranges[0][1] += 1e-3), Some(Quantity::Range));
-    assert_eq!(worst(&|d| d.branches[at].points[middle].spectrum[1] += 1e-2), Some(Quantity::Spectrum));
+    assert!(worst(&|_| ()).is_empty());
+    assert!(worst(&|d| torus(d, &|t| t.rotation += 1e-4)).contains(&Quantity::Rotation));
+    assert!(worst(&|d| torus(d, &|t| t.profile.iter_mut().skip(40).take(1).for_each(|x| *x += 1e-2))).contains(&Quantity::Profile));
+    assert!(worst(&|d| d.branches[at].points[middle].ranges[0][1] += 1e-3).contains(&Quantity::Range));
+    assert!(worst(&|d| d.branches[at].points[middle].spectrum[1] += 1e-2).contains(&Quantity::Spectrum));
 }
 
 #[test]

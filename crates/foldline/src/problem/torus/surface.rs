@@ -8,7 +8,6 @@ use super::{phases, summit};
 use super::start::transferred;
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::diagram::{Point, Solution, Symmetry};
-use crate::linalg::max_abs;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -35,19 +34,14 @@ impl TorusProblem<'_> {
             }
         }
         let all = self.channels(states, &times, &parameters);
-        let spacing = [1.0 / fine as f64, 0.5 / (self.intervals() * m) as f64];
+        let grid = [fine as f64, 0.5 / (self.intervals() * m) as f64];
         let ranges = all.chunks_exact(lanes).enumerate().map(|(channel, line)| {
-            let size = max_abs(line);
             [-1.0, 1.0].map(|sign| {
-                let improved = summit::hills(line, sign, fine).into_iter().map(|at| {
-                    let place = [(at % fine) as f64 / fine as f64, times[at]];
-                    let value = |at: [f64; 2]| {
-                        let all = self.channels(self.state(u, at), &[at[1] - at[1].floor()], &parameters);
-                        sign * all[channel]
-                    };
-                    summit::climb(&value, place, spacing, size)
-                });
-                sign * improved.fold(f64::NAN, f64::max)
+                let value = |at: [f64; 2]| {
+                    let all = self.channels(self.state(u, at), &[at[1] - at[1].floor()], &parameters);
+                    sign * all[channel]
+                };
+                sign * summit::largest(line, &times, sign, grid, &value)
             })
         });
         let weight = |at: usize| {

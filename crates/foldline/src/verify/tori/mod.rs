@@ -278,15 +278,11 @@ impl<'a, 'b> Walls<'a, 'b> {
         let (states, times) = self.lanes();
         let lanes = times.len();
         let all = self.channels(states, &times, 0.0);
-        let spacing = [1.0 / count as f64, 1.0 / INSTANTS as f64];
+        let grid = [count as f64, 1.0 / INSTANTS as f64];
         let each = all.chunks_exact(lanes).enumerate().map(|(channel, line)| {
-            let size = max_abs(line);
             [-1.0, 1.0].map(|sign| {
                 let value = |at: [f64; 2]| sign * self.channels(self.state(at), &[at[1] - at[1].floor()], at[0])[channel];
-                let tops = summit::hills(line, sign, count).into_iter().map(|at| {
-                    summit::climb(&value, [(at % count) as f64 / count as f64, times[at]], spacing, size)
-                });
-                sign * tops.fold(f64::NAN, f64::max)
+                sign * summit::largest(line, &times, sign, grid, &value)
             })
         });
         each.collect()
