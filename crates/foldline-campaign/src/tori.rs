@@ -4,7 +4,7 @@
 //! rotation number. Oscillators whose parameters are drawn at random cross tongues of locking of any width.
 //!
 //! Each branch is examined twice: by [`foldline::verify`], whose trajectories start on the torus, and by the recognition of surveys and sweeps,
-//! which starts a little off it and knows nothing of the torus.
+//! which starts a little off it and does not use it.
 
 use crate::cases::study;
 use crate::drawn::{Draw, Problem};
@@ -98,9 +98,9 @@ v = { equation = "mu*(1 - y^2)*v - w^2*y + c*(x - y)", range = [-3, 3] }
     Problem {
         name: "Langford",
         model: include_str!("../../../models/langford.toml"),
-        draws: &[Draw::Uniform("rho", 0.5, 0.6)],
-        start: "attractor = \"torus\"\nsamples = 8",
-        branch: "free = \"rho\"\nrange = [0.4, 0.66]\nmax-points = 30",
+        draws: &[Draw::Uniform("rho", 0.66, 0.8)],
+        start: "attractor = \"cycle\"\nsamples = 8",
+        branch: "free = \"rho\"\nrange = [0.45, 0.85]\nswitch = { torus = 1 }\nmax-points = 30",
         bounded: false,
     },
 ];

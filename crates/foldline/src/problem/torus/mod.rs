@@ -130,9 +130,10 @@ impl<'a> TorusProblem<'a> {
 
     /// The profile of segment k, `[N][m + 1][n]`.
     fn chain(&self, v: &[f64], k: usize) -> Vec<f64> {
-        let width = self.phases * self.n;
-        let own = v[..self.profile_size()].chunks_exact(width);
-        own.flat_map(|node| &node[k * self.n..(k + 1) * self.n]).copied().collect()
+        let (n, width, size) = (self.n, self.phases * self.n, self.profile_size());
+        let mut own = Vec::with_capacity(size / self.phases + 1 + self.setting.freedom());
+        v[..size].chunks_exact(width).for_each(|node| own.extend_from_slice(&node[k * n..(k + 1) * n]));
+        own
     }
 
     /// Writes the profile of segment k to `v`.

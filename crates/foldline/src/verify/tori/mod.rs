@@ -113,8 +113,10 @@ fn recomputed(
     let (limit, apart) = part.range_difference(point, &walls.ranges(), stated, &passed_on);
     out.checks.push(part.check(point, Quantity::Range, Some(limit), apart));
     let second = setting.field.second_phase().is_some();
-    let (own, error) = exponents::of_ring(&solved.ring, &solved.carried, second, torus.phases());
-    part.moduli(point, &own, noise + error, out);
+    let all = |solved: &Solved| exponents::of_ring(&solved.ring, &solved.carried, second, torus.phases());
+    let ((own, error), (other, _)) = (all(&solved), all(&rough));
+    let error = own.iter().zip(&other).fold(noise + error, |most, (a, b)| larger(most, (a - b).abs()));
+    part.moduli(point, &own, error, out);
     Ok((solved, noise))
 }
 

@@ -8,8 +8,8 @@
 //!
 //! ```text
 //!   (1)  Φ(X_k; T, λ) - Σ_l R_kl(ρ) X_l = 0
-//!   (2)  Σ_k ⟨X'(φ_k), X_k - X̃_k⟩ = 0        phase, X̃ the initial curve
-//!   (3)  Σ_k ⟨f(X̃_k), X_k - X̃_k⟩ = 0         phase in time, without forcing
+//!   (2)  Σ_k ⟨X̃'(φ_k), δX_k⟩ = 0              phase of an update δX, X̃ the initial curve
+//!   (3)  Σ_k ⟨f(X_k), δX_k⟩ = 0               its phase in time, without forcing
 //! ```
 //!
 //! T of a forced torus is prescribed, and with two forcings ρ is a function of λ, which replaces (2). The shortest update is

@@ -32,7 +32,7 @@ const PERIODS: usize = 1000;
 /// Periods over which the directions settle, within them.
 const SETTLING: usize = 200;
 
-/// What a trajectory shows of a torus.
+/// Rotation number, distance and exponents that a trajectory shows.
 pub(super) struct Seen {
     /// ρ, and the difference of this average between both halves.
     pub(super) rotation: [f64; 2],
