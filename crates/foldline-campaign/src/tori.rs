@@ -108,12 +108,15 @@ v = { equation = "mu*(1 - y^2)*v - w^2*y + c*(x - y)", range = [-3, 3] }
 /// Counts, and what differs from simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Cases, and those in which a sample did not move quasi-periodically.
+    /// Number of cases.
     pub cases: usize,
+    /// Number of cases without a torus.
     pub without: usize,
-    /// Points of the branches of tori, and those of them that were verified and simulated.
+    /// Number of points of the branches of tori.
     pub points: usize,
+    /// Number of points that were verified.
     pub verified: usize,
+    /// Number of points that were simulated from beside them.
     pub simulated: usize,
     /// Number of comparisons of [`foldline::verify`].
     pub checks: usize,
@@ -147,8 +150,14 @@ impl Report {
 
 impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        writeln!(f, "{} cases, {} without a quasi-periodic start, {} tori", self.cases, self.without, self.points)?;
-        writeln!(f, "{} verified: {} comparisons, {} outside the stated error", self.verified, self.checks, self.wrong.len())?;
+        writeln!(f, "{} cases, {} without a torus, {} tori", self.cases, self.without, self.points)?;
+        writeln!(
+            f,
+            "{} verified: {} comparisons, {} outside the stated error",
+            self.verified,
+            self.checks,
+            self.wrong.len()
+        )?;
         writeln!(
             f,
             "{} simulated from beside them: {} locked or of another type, {} undecided",
@@ -205,9 +214,10 @@ pub fn examine(number: usize) -> Report {
             let trial =
                 Trial { field: system.field, scales: &system.scales, whirl: None, jobs: 1, limits: Limits::patient() };
             let value = point.parameters[branch.free];
-            let sweep = stepped_sweep(&trial, &point.parameters, branch.free, &[value], &start, &mut |_, _| None, &|_| {
-                Verdict::Continue
-            });
+            let sweep =
+                stepped_sweep(&trial, &point.parameters, branch.free, &[value], &start, &mut |_, _| None, &|_| {
+                    Verdict::Continue
+                });
             let Some(seen) = sweep.into_iter().next() else { continue };
             report.simulated += 1;
             let place = format!("{name} at {value}, rotation number {}", torus.rotation);
@@ -217,11 +227,14 @@ pub fn examine(number: usize) -> Report {
                 Motion::Torus if torus.forcing_periods == 0 => {}
                 Motion::Torus => {
                     let Some([own, error]) = seen.recognition.rotation else { continue };
-                    let off = [1.0, -1.0].map(|sign| (sign * own - torus.rotation - (sign * own - torus.rotation).round()).abs());
+                    let off = [1.0, -1.0]
+                        .map(|sign| (sign * own - torus.rotation - (sign * own - torus.rotation).round()).abs());
                     let off = off[0].min(off[1]);
                     let stated = 3.0 * error + point.trust.discretisation * (1.0 + torus.rotation.abs());
                     if off.is_nan() || off > stated {
-                        report.wrong.push(format!("{place}: {own} in simulation, off by {off:.1e}, stated {stated:.1e}"));
+                        report
+                            .wrong
+                            .push(format!("{place}: {own} in simulation, off by {off:.1e}, stated {stated:.1e}"));
                     }
                 }
                 Motion::Other => report.undecided.push(format!("{place}: {}", seen.recognition.reason)),

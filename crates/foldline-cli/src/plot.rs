@@ -69,7 +69,8 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let (diagram, plane) = shown(diagram, typed.curves, [x, y])?;
     let picture = Picture {
         x: x.or(plane.map(|[first, _]| Quantity::Parameter(first))),
-        y: y.or(plane.map(|[_, second]| Quantity::Parameter(second))).or(typed.susceptibility.then_some(Quantity::Largest(first))),
+        y: y.or(plane.map(|[_, second]| Quantity::Parameter(second)))
+            .or(typed.susceptibility.then_some(Quantity::Largest(first))),
         window: typed.window.as_deref().map(window).transpose()?,
         title: typed.title.clone(),
         ..Picture::default()

@@ -93,7 +93,8 @@ fn an_equilibrium_responds_with_the_resolvent_and_jumps_are_refused() {
 #[test]
 fn responses_are_drawn_and_points_without_one_are_reported() {
     let folder = tempfile::tempdir().unwrap();
-    let model = "[parameters]\nw = 0.6\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"v\"\nv = \"-0.1*v - x + cos(w*t)\"\n";
+    let model =
+        "[parameters]\nw = 0.6\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"v\"\nv = \"-0.1*v - x + cos(w*t)\"\n";
     run(model, "attractor = \"cycle\"", "free = \"w\"\nrange = [0.5, 1.4]", folder.path());
     let asked = ["plot", "run", "--susceptibility", "--force", "v=1", "--frequency", "2*w", "-o", "response.svg"];
     let output = foldline(&asked, folder.path());

@@ -20,11 +20,16 @@ fn of(model: &str, study: &str) -> (Study, Diagram) {
 }
 
 fn fold(branch: &Branch) -> &Point {
-    &branch.special.iter().find(|special| special.kind == Kind::Fold).unwrap_or_else(|| panic!("{:?}", branch.ends)).point
+    &branch
+        .special
+        .iter()
+        .find(|special| special.kind == Kind::Fold)
+        .unwrap_or_else(|| panic!("{:?}", branch.ends))
+        .point
 }
 
 #[track_caller]
-fn mark<'d>(branch: &'d Branch, index: usize, value: f64) -> &'d Point {
+fn mark(branch: &Branch, index: usize, value: f64) -> &Point {
     let there = |p: &&Point| (p.parameters[index] - value).abs() < 1e-9;
     let marks = branch.special.iter().filter(|special| special.kind == Kind::Mark).map(|special| &special.point);
     marks.chain(&branch.points).find(there).unwrap_or_else(|| panic!("no point at {value}: {:?}", branch.ends))

@@ -70,7 +70,10 @@ fn tori_of_a_forced_oscillator_are_verified_and_changes_to_them_are_detected() {
     };
     assert!(worst(&|_| ()).is_empty());
     assert!(worst(&|d| torus(d, &|t| t.rotation += 1e-4)).contains(&Quantity::Rotation));
-    assert!(worst(&|d| torus(d, &|t| t.profile.iter_mut().skip(40).take(1).for_each(|x| *x += 1e-2))).contains(&Quantity::Profile));
+    assert!(
+        worst(&|d| torus(d, &|t| t.profile.iter_mut().skip(40).take(1).for_each(|x| *x += 1e-2)))
+            .contains(&Quantity::Profile)
+    );
     assert!(worst(&|d| d.branches[at].points[middle].ranges[0][1] += 1e-3).contains(&Quantity::Range));
     assert!(worst(&|d| d.branches[at].points[middle].spectrum[1] += 1e-2).contains(&Quantity::Spectrum));
 }
@@ -97,7 +100,11 @@ fn a_fold_of_tori_is_located_again_and_unstable_tori_beyond_it_are_recomputed() 
          [[branch]]\nname = \"t\"\nfrom = \"g\"\nfree = \"Omega\"\nrange = [2.5, 6]\n",
     );
     let branch = diagram.branch("t").unwrap();
-    eprintln!("{:?} {:?}", branch.special.iter().map(|s| (s.kind, s.point.parameters.clone())).collect::<Vec<_>>(), branch.ends);
+    eprintln!(
+        "{:?} {:?}",
+        branch.special.iter().map(|s| (s.kind, s.point.parameters.clone())).collect::<Vec<_>>(),
+        branch.ends
+    );
     let folds = branch.special.iter().filter(|special| special.kind == Kind::Fold).count();
     let found = verified(&study, &diagram, "t", 4);
     passes(&found);

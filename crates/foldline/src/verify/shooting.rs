@@ -234,7 +234,10 @@ impl Shooting<'_> {
     /// Flow along an orbit through its jumps; `None` if the integration fails.
     pub(super) fn through_jumps(&self, orbit: &Orbit, ignored: Option<Ignored>) -> Option<Flow> {
         let (n, scales) = (orbit.dim(), &orbit.scales);
-        let tolerance = Tolerance { relative: self.accuracy, absolute: Variational { setting: self.setting }.absolute(self.accuracy) };
+        let tolerance = Tolerance {
+            relative: self.accuracy,
+            absolute: Variational { setting: self.setting }.absolute(self.accuracy),
+        };
         let (parameters, forced) = (self.setting.at(&orbit.free), orbit.forced);
         let located = Located { setting: self.setting, parameters, tolerance, forced, ignored };
         let (mut flow, times) = (Flow::default(), orbit.times());

@@ -83,7 +83,10 @@ impl TorusProblem<'_> {
             moduli
         };
         let second = usize::from(self.second.is_some());
-        let change = match self.transitions_at(&there).and_then(|all| self.representatives(&all, there[self.profile_size() + 1])) {
+        let change = match self
+            .transitions_at(&there)
+            .and_then(|all| self.representatives(&all, there[self.profile_size() + 1]))
+        {
             Some(other) => moduli(found.spectrum[second..].to_vec())
                 .iter()
                 .zip(moduli(other))

@@ -48,7 +48,13 @@ fn hills(line: &[f64], sign: f64, fine: usize) -> Vec<Hill> {
 ///
 /// A parabola through a local maximum of the grid and its neighbours rises above it by a quarter of the largest difference from them at most,
 /// and a cone by half of it, in each of both directions. Hills that cannot become the highest are left out.
-pub fn largest(line: &[f64], times: &[f64], sign: f64, [fine, spacing]: [f64; 2], value: &dyn Fn([f64; 2]) -> f64) -> f64 {
+pub fn largest(
+    line: &[f64],
+    times: &[f64],
+    sign: f64,
+    [fine, spacing]: [f64; 2],
+    value: &dyn Fn([f64; 2]) -> f64,
+) -> f64 {
     let (count, size) = (fine as usize, max_abs(line));
     let mut best = f64::NAN;
     for (at, own, depth) in hills(line, sign, count) {

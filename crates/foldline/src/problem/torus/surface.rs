@@ -4,8 +4,8 @@
 //! the interpolant. The trajectory from phase φ continues beyond t = 1 as the one from φ + ρ.
 
 use super::TorusProblem;
-use super::{phases, summit};
 use super::start::transferred;
+use super::{phases, summit};
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::diagram::{Point, Solution, Symmetry};
 use num_complex::Complex64;

@@ -71,7 +71,9 @@ impl Frame {
 
     /// (2) for all but the first `trivial` directions, the largest first, with the difference between both halves.
     pub(super) fn exponents(&self, trivial: usize, settling: usize) -> (Vec<f64>, f64) {
-        let line = |i: usize| -> Vec<f64> { self.growth.iter().skip(settling * self.n + i).step_by(self.n).copied().collect() };
+        let line = |i: usize| -> Vec<f64> {
+            self.growth.iter().skip(settling * self.n + i).step_by(self.n).copied().collect()
+        };
         let mut apart = 0.0;
         let mut all: Vec<f64> = (trivial..self.n)
             .map(|i| {
@@ -95,7 +97,8 @@ pub(super) struct Along {
 impl Along {
     pub(super) fn of(ring: &Ring, carried: &Carried, second: bool) -> Along {
         let n = ring.dim();
-        let scaled = |v: Vec<f64>| -> Vec<f64> { v.iter().enumerate().map(|(at, x)| x / ring.scales[at % n]).collect() };
+        let scaled =
+            |v: Vec<f64>| -> Vec<f64> { v.iter().enumerate().map(|(at, x)| x / ring.scales[at % n]).collect() };
         let around = (!second).then(|| scaled(ring.around()));
         let flow = (!ring.forced).then(|| scaled(carried.begins.clone()));
         Along { n, directions: around.into_iter().chain(flow).collect() }

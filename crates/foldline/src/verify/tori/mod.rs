@@ -35,7 +35,13 @@ const BLOCK: usize = 16;
 const INSTANTS: usize = 1024;
 
 /// Verifies the points of a branch of tori with the given indices.
-pub(super) fn verify(system: &System, setting: &Setting, branch: &Branch, chosen: &[usize], tolerance: f64) -> Verified {
+pub(super) fn verify(
+    system: &System,
+    setting: &Setting,
+    branch: &Branch,
+    chosen: &[usize],
+    tolerance: f64,
+) -> Verified {
     let mut out = Verified::default();
     let part = Part { system, setting, branch };
     let points: Vec<&Point> = chosen.iter().map(|i| &branch.points[*i]).collect();
@@ -283,7 +289,8 @@ impl<'a, 'b> Walls<'a, 'b> {
         let grid = [count as f64, 1.0 / INSTANTS as f64];
         let each = all.chunks_exact(lanes).enumerate().map(|(channel, line)| {
             [-1.0, 1.0].map(|sign| {
-                let value = |at: [f64; 2]| sign * self.channels(self.state(at), &[at[1] - at[1].floor()], at[0])[channel];
+                let value =
+                    |at: [f64; 2]| sign * self.channels(self.state(at), &[at[1] - at[1].floor()], at[0])[channel];
                 sign * summit::largest(line, &times, sign, grid, &value)
             })
         });
