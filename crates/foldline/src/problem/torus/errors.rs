@@ -32,7 +32,7 @@ pub(super) struct Measured {
     at: Vec<f64>,
     /// `[N]`: errors on the intervals, over all segments.
     time: Vec<f64>,
-    /// First-order change of the unknowns that would remove the error in time.
+    /// First-order change of the unknowns by the errors in time and in the phase.
     shift: Vec<f64>,
     /// `[harmonics + 1]`: largest modulus of this or a higher harmonic, relative to the scales.
     envelope: Vec<f64>,
@@ -115,13 +115,14 @@ impl TorusProblem<'_> {
         for j in (1..envelope.len()).rev() {
             envelope[j - 1] = larger(envelope[j - 1], envelope[j]);
         }
-        let gain = self.gain_of_tail(u, &scale);
+        let (gain, by_tail) = self.effect_of_tail(u, &scale);
+        shift.iter_mut().zip(&by_tail).for_each(|(all, own)| *all += own);
         Measured { at: u.to_vec(), time, shift, envelope, gain }
     }
 
-    /// Largest change of the torus by a defect of the closure that consists of the last two harmonics of the curve, relative to
-    /// its size; at least 1.
-    fn gain_of_tail(&self, u: &[f64], scale: &[f64]) -> f64 {
+    /// Change of the torus by a defect of the closure that consists of the last two harmonics of the curve, and before it its
+    /// largest value relative to that defect, at least 1.
+    fn effect_of_tail(&self, u: &[f64], scale: &[f64]) -> (f64, Vec<f64>) {
         let (n, size, count) = (self.n, self.profile_size(), self.phases);
         let block = (self.scheme.degree + 1) * n;
         let last = (self.intervals() - 1) * block;
@@ -144,7 +145,7 @@ impl TorusProblem<'_> {
         let mut shift = vec![0.0; u.len()];
         self.solve_joined(&rhs, &mut shift);
         let response = self.relative_size(&shift, u) / most;
-        if response.is_finite() { response.max(1.0) } else { 1.0 }
+        if response.is_finite() { (response.max(1.0), shift) } else { (1.0, vec![0.0; u.len()]) }
     }
 
     /// The stated error at `u`: four times the larger of the estimates in time and in the phase.
@@ -153,7 +154,7 @@ impl TorusProblem<'_> {
         SAFE * self.measured_at(u, most) + ROUNDING
     }
 
-    /// `u` without its error in time, to first order.
+    /// `u` without its estimated error, to first order.
     pub(super) fn corrected(&self, u: &[f64]) -> Vec<f64> {
         self.measured_at(u, |known| u.iter().zip(&known.shift).map(|(u, d)| u - d).collect())
     }

@@ -69,7 +69,7 @@ impl Frame {
         self.growth.extend(logs);
     }
 
-    /// (2) for all but the first `trivial` directions, the largest first, with the difference between both halves.
+    /// (2) for all but the first `trivial` directions, the largest first, with the error of the averages.
     pub(super) fn exponents(&self, trivial: usize, settling: usize) -> (Vec<f64>, f64) {
         let line = |i: usize| -> Vec<f64> {
             self.growth.iter().skip(settling * self.n + i).step_by(self.n).copied().collect()
@@ -78,14 +78,22 @@ impl Frame {
         let mut all: Vec<f64> = (trivial..self.n)
             .map(|i| {
                 let own = line(i);
-                let (first, second) = own.split_at(own.len() / 2);
-                apart = larger(apart, (weighted_average(first) - weighted_average(second)).abs());
-                weighted_average(&own)
+                let [mean, error] = averaged(&own);
+                apart = larger(apart, error);
+                mean
             })
             .collect();
         all.sort_by(|a, b| b.total_cmp(a));
         (all, apart)
     }
+}
+
+/// Weighted average of a sequence, and its largest difference from those of three halves: at the beginning, in the middle and at the
+/// end.
+pub(super) fn averaged(values: &[f64]) -> [f64; 2] {
+    let (mean, half) = (weighted_average(values), values.len() / 2);
+    let off = |from: usize| (weighted_average(&values[from..from + half]) - mean).abs();
+    [mean, [0, half / 2, values.len() - half].into_iter().map(off).fold(0.0, larger)]
 }
 
 /// Directions along the torus at a phase, in scaled components: along the curve and, without forcing, along the flow.

@@ -133,6 +133,17 @@ fn sorted(point: &Point) -> Vec<Complex64> {
     all
 }
 
+/// Logarithms of moduli, averaged over the conjugate pairs among stored multipliers: a pair has one modulus, and only the growth along
+/// both of its directions together settles quickly.
+fn paired(stored: &[Complex64], found: &[f64]) -> Vec<f64> {
+    let other = |i: usize| {
+        let z = stored[i];
+        stored.iter().position(|other| z.im != 0.0 && (other - z.conj()).norm() < 1e-9 * z.norm())
+    };
+    let own = |(i, value): (usize, &f64)| 0.5 * (value + other(i).and_then(|k| found.get(k)).unwrap_or(value));
+    found.iter().enumerate().take(stored.len()).map(own).collect()
+}
+
 /// Solution next to a special point: the parameter, its component of the unit tangent, and the non-trivial multipliers, with the
 /// arguments of those of the special point.
 pub(super) type Beside = (f64, f64, Vec<Complex64>);
@@ -158,12 +169,8 @@ pub(super) fn beside(
         let solved = rings.solve(&rings.moved(&base, &moved), Some(&along))?;
         let slope = *solved.kernel.first()?.last()?;
         let (found, _) = exponents::of_ring(&solved.ring, &solved.carried, second, torus.phases());
-        let spectrum = stored.iter().enumerate().map(|(i, z)| {
-            // A pair has one modulus; growth along it is measured twice.
-            let conjugate = stored.iter().position(|other| z.im != 0.0 && (other - z.conj()).norm() < 1e-9 * z.norm());
-            let own = 0.5 * (found[i] + found[conjugate.unwrap_or(i)]);
-            Complex64::from_polar(own.exp(), z.arg())
-        });
+        let spectrum =
+            stored.iter().zip(paired(&stored, &found)).map(|(z, own)| Complex64::from_polar(own.exp(), z.arg()));
         Some((*solved.ring.free.last()?, slope, spectrum.collect()))
     });
     Ok(each.collect())
@@ -173,9 +180,10 @@ impl Part<'_> {
     /// Compares the moduli of the multipliers with logarithms found.
     fn moduli(&self, point: &Point, exponents: &[f64], noise: f64, out: &mut Verified) {
         let all = sorted(point);
-        let pairs = || all.iter().map(|z| z.norm()).zip(exponents.iter().map(|e| e.exp()));
+        let own = if all.len() == exponents.len() { paired(&all, exponents) } else { Vec::new() };
+        let pairs = || all.iter().map(|z| z.norm()).zip(own.iter().map(|e| e.exp()));
         let apart = pairs().fold(0.0, |most, (a, b)| larger(most, (a - b).abs() / a.max(1.0)));
-        let apart = if all.len() == exponents.len() { apart } else { f64::INFINITY };
+        let apart = if all.len() == own.len() { apart } else { f64::INFINITY };
         let stated = Some(point.trust.spectrum + noise).filter(|stated| stated.is_finite());
         out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
         let wrong = pairs().filter(|(a, b)| (*a > 1.0) != (*b > 1.0));

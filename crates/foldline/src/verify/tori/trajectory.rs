@@ -17,9 +17,8 @@
 
 use super::super::shooting::STEPS;
 use super::super::variational::Variational;
-use super::exponents::{Along, Frame};
+use super::exponents::{Along, Frame, averaged};
 use super::ring::{Rings, Solved};
-use crate::attractors::weighted_average;
 use crate::contract::{Batch, Parameters};
 use crate::diagram::Torus;
 use crate::linalg::{dot, larger};
@@ -34,7 +33,7 @@ const SETTLING: usize = 200;
 
 /// Rotation number, distance and exponents that a trajectory shows.
 pub(super) struct Seen {
-    /// ρ, and the difference of this average between both halves.
+    /// ρ, and the error of the average.
     pub(super) rotation: [f64; 2],
     /// Largest distance from the stored curve, relative to the scales.
     pub(super) distance: f64,
@@ -160,10 +159,8 @@ impl Run {
         if !distance.is_finite() {
             return None;
         }
-        let (first, last) = turns.split_at(turns.len() / 2);
-        let apart = (weighted_average(first) - weighted_average(last)).abs();
         let (exponents, exponent_error) = self.frame.exponents(self.trivial, SETTLING);
-        Some(Seen { rotation: [weighted_average(&turns), apart], distance, exponents, exponent_error })
+        Some(Seen { rotation: averaged(&turns), distance, exponents, exponent_error })
     }
 }
 
