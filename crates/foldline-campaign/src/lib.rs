@@ -13,6 +13,7 @@
 //! | how large are the true errors? | [`errors`] |
 //! | is every change of stability explained? | [`explained`] |
 //! | do results depend on units? | [`rescaled`] |
+//! | do tori move as simulations do? | [`tori`] |
 //! | what is reported? | [`report`] |
 //! | how long may it take? | [`watch`] |
 //! | are published and independent results reproduced? | [`outside`] |
@@ -28,6 +29,7 @@ pub mod rescaled;
 pub mod rotor;
 pub mod routes;
 pub mod same;
+pub mod tori;
 pub mod watch;
 
 use cases::Case;

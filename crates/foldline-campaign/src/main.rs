@@ -1,9 +1,9 @@
 //! `foldline-campaign [COUNT] [OPTIONS]`, the program behind `cargo xtask campaign`.
 
-use foldline_campaign::{LIMIT, campaign, cases, drawn, rescaled, rotor};
+use foldline_campaign::{LIMIT, campaign, cases, drawn, rescaled, rotor, tori};
 use std::process::ExitCode;
 
-const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STARTS] [--from NUMBER] [--only TEXT] [--rescaled [DRAWS]] [--verbose]
+const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STARTS] [--from NUMBER] [--only TEXT] [--rescaled [DRAWS]] [--tori COUNT] [--verbose]
   COUNT        how many random rotors, 200 if not said
   --random     how many cases of neurons, kinetics, ecology, coupled cells and forced oscillators with random parameters, 240 if
                not said
@@ -13,6 +13,7 @@ const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STA
   --tolerance  instead of 1e-6
   --rescaled   instead of that: every case once more with each state, each parameter and the time in units of its own, powers
                of ten from 1e-12 to 1e12, DRAWS times (1 if not said)
+  --tori       instead of that: COUNT oscillators with random parameters whose tori are compared with simulation, from number --from on
   --limit      seconds for each case, 300 if not said
   --jobs       threads, one for each core if not said
   --verbose    a line for each case
@@ -34,7 +35,7 @@ fn answer() -> Result<bool, String> {
     let mut limit = LIMIT;
     let mut jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
     let (mut verbose, mut trace, mut tolerance) = (false, false, None);
-    let mut draws = None;
+    let (mut draws, mut quasi) = (None, None);
     let mut rest = std::env::args().skip(1).peekable();
     while let Some(argument) = rest.next() {
         let mut number =
@@ -47,6 +48,7 @@ fn answer() -> Result<bool, String> {
             }
             "--random" => random = number("--random")?,
             "--limit" => limit = std::time::Duration::from_secs(number("--limit")? as u64),
+            "--tori" => quasi = Some(number("--tori")?),
             "--jobs" => jobs = number("--jobs")?,
             "--classical" => starts = number("--classical")?,
             "--only" => only = rest.next().ok_or("--only needs a text")?,
@@ -55,6 +57,19 @@ fn answer() -> Result<bool, String> {
             "--trace" => trace = true,
             other => count = other.parse().map_err(|_| format!("{other}: not a number"))?,
         }
+    }
+    if let Some(count) = quasi {
+        let mut report = tori::Report::default();
+        for number in from..from + count {
+            let own = tori::examine(number);
+            if verbose {
+                eprintln!("{}: {} tori", tori::case(number).0, own.points);
+            }
+            own.wrong.iter().chain(&own.other).chain(&own.undecided).for_each(|line| eprintln!("{line}"));
+            report.add(own);
+        }
+        print!("{report}");
+        return Ok(report.good());
     }
     let mut all = rotor::rotors(from..from + count);
     all.extend(cases::classical(starts));

@@ -6,6 +6,7 @@ mod closing;
 mod knot;
 mod outside;
 mod rescaled;
+mod tori;
 
 #[test]
 fn every_file_is_part_of_this_program() {

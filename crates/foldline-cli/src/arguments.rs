@@ -551,7 +551,7 @@ pub struct Plot {
     #[arg(long, value_name = "NAME")]
     pub branch: Vec<String>,
     /// Draw this map over one or two parameters instead
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "branch", "curves", "window", "unit", "uncertainty", "tornado"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "branch", "curves", "window", "unit", "uncertainty", "tornado", "susceptibility"])]
     pub map: Option<String>,
     /// With --map: quantity to draw [default: what is found in each cell; over one parameter, the first number]
     #[arg(long, value_name = "NAME", requires = "map")]
@@ -574,6 +574,16 @@ pub struct Plot {
     /// sensitivities]
     #[arg(long, value_name = "POINT", requires = "tornado")]
     pub at: Option<String>,
+    /// Draw the response of every solution to a small further forcing, to first order, as a quantity NAME_response of each state
+    /// [default vertical axis: that of the first state]
+    #[arg(long, conflicts_with_all = ["uncertainty", "tornado", "curves", "unit"])]
+    pub susceptibility: bool,
+    /// With --susceptibility: amplitude of the forcing, as for `foldline table`; can be repeated
+    #[arg(long, value_name = "STATE=AMPLITUDE", allow_hyphen_values = true, requires = "susceptibility")]
+    pub force: Vec<String>,
+    /// With --susceptibility: ν, an expression of parameters in radians per unit of time
+    #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true, requires = "susceptibility")]
+    pub frequency: Option<String>,
     /// Limits of the axes
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
     pub window: Option<String>,

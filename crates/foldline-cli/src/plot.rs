@@ -3,7 +3,7 @@
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::progress::SignOfLife;
-use crate::table::{Run, asked_for, conversion, read};
+use crate::table::{Run, add_responses, asked_for, conversion, read};
 use crate::tornado;
 use crate::verbosity::report;
 use foldline::contract::VectorField;
@@ -42,6 +42,13 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(name) = &typed.tornado {
         return tornado::write(typed, &run, name);
     }
+    let (mut outcome, states) = (Outcome::Done, run.model.states.len());
+    let first = states + run.model.outputs.len();
+    if typed.susceptibility {
+        run = read(&typed.folder, Part::Everything)?;
+        selected(&mut run.diagram, &typed.branch)?;
+        outcome = add_responses(&mut run, &typed.force, typed.frequency.as_deref())?;
+    }
     let deviations = match (typed.uncertainty || run.uncertainty) && !typed.curves {
         true => deviations(typed, &run)?,
         false => Vec::new(),
@@ -62,7 +69,8 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let (diagram, plane) = shown(diagram, typed.curves, [x, y])?;
     let picture = Picture {
         x: x.or(plane.map(|[first, _]| Quantity::Parameter(first))),
-        y: y.or(plane.map(|[_, second]| Quantity::Parameter(second))),
+        y: y.or(plane.map(|[_, second]| Quantity::Parameter(second)))
+            .or(typed.susceptibility.then_some(Quantity::Largest(first))),
         window: typed.window.as_deref().map(window).transpose()?,
         title: typed.title.clone(),
         ..Picture::default()
@@ -75,7 +83,7 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let picture = Picture { layers, ..picture };
     draw(&diagram, &model, &picture, &typed.output)?;
     undrawn(&diagram, &model, axes)?;
-    Ok(Outcome::Done)
+    Ok(outcome)
 }
 
 /// Standard deviations of the special points to first order, by branch and index.

@@ -49,6 +49,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "maps-in-studies",
         "outputs",
         "sensitivities",
+        "tori",
         "tutorial-forced-oscillator",
         "tutorial-neuron",
         "tutorial-rotor",

@@ -58,6 +58,8 @@ mod susceptible;
 mod switched_starts;
 mod tables;
 mod tori;
+mod tori_folds;
+mod tori_verified;
 mod totals;
 mod units;
 mod verify;

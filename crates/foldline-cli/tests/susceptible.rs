@@ -89,3 +89,19 @@ fn an_equilibrium_responds_with_the_resolvent_and_jumps_are_refused() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(3) && said.contains("the state jumps at events"), "{said}");
 }
+
+#[test]
+fn responses_are_drawn_and_points_without_one_are_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    let model =
+        "[parameters]\nw = 0.6\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"v\"\nv = \"-0.1*v - x + cos(w*t)\"\n";
+    run(model, "attractor = \"cycle\"", "free = \"w\"\nrange = [0.5, 1.4]", folder.path());
+    let asked = ["plot", "run", "--susceptibility", "--force", "v=1", "--frequency", "2*w", "-o", "response.svg"];
+    let output = foldline(&asked, folder.path());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let picture = std::fs::read_to_string(folder.path().join("response.svg")).unwrap();
+    // The largest response, at 2w = 1, is 10.
+    assert!(picture.contains("x_response") && picture.contains(">10<"), "{picture}");
+    let without = foldline(&["plot", "run", "--susceptibility", "--force", "v=1", "-o", "response.svg"], folder.path());
+    assert!(String::from_utf8_lossy(&without.stderr).contains("the frequency of the forcing is missing"));
+}

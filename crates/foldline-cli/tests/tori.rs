@@ -177,3 +177,19 @@ fn a_seed_on_which_the_forcing_acts_is_refused() {
     let Some(Ending::NoStart(why)) = &diagram.branch("t").unwrap().ends[1] else { panic!() };
     assert!(why.contains("the forcing acts at the parameters of this seed"), "{why}");
 }
+
+#[test]
+fn a_branch_of_tori_met_by_simulation_ends_at_the_torus_point_of_a_cycle() {
+    let (study, diagram) = of(
+        "van-der-pol-forced",
+        "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"torus\"\nparameters = { s = 0.6, Omega = 1.2 }\n\
+         [[branch]]\nname = \"t\"\nfrom = \"s\"\nfree = \"s\"\nrange = [0.5, 1.2]",
+    );
+    let s = study.model.parameter_index("s").unwrap();
+    let branch = diagram.branch("t").unwrap();
+    let Some(Ending::Joined { at: Kind::Torus, parameter }) = branch.ends[1] else { panic!("{:?}", branch.ends) };
+    // The parameter is extrapolated from the amplitude.
+    near(parameter, known("A1-NS").0[0], 1e-5);
+    assert!(branch.points.iter().all(|point| point.unstable == 0 && point.parameters[s] < parameter + 1e-5));
+    assert!(branch.special.is_empty());
+}

@@ -6,11 +6,15 @@ mod auto;
 mod basins;
 mod designs;
 mod emitted;
+#[path = "export/main.rs"]
+mod export;
 mod growing_study;
 mod hostile;
 mod model_file;
 mod model_language;
 mod responses;
+#[path = "rotors/main.rs"]
+mod rotors;
 mod run_file;
 mod study_file;
 mod symmetry;

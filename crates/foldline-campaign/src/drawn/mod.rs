@@ -23,7 +23,7 @@ pub enum Draw {
 }
 
 impl Draw {
-    fn value(self, random: &mut Random) -> (&'static str, f64) {
+    pub(crate) fn value(self, random: &mut Random) -> (&'static str, f64) {
         match self {
             Draw::Uniform(name, low, high) => (name, random.uniform(low, high)),
             Draw::Logarithmic(name, low, high) => (name, random.logarithmic(low, high)),

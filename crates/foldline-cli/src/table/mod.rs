@@ -9,6 +9,7 @@ mod sensitivity;
 mod susceptibility;
 
 pub use sensitivity::found;
+pub use susceptibility::add_responses;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};

@@ -1,6 +1,6 @@
 //! `foldline table --susceptibility`: first-order response to a small further forcing.
 
-use super::{Cell, Column, Style, Table, asked_for, columns, read, write};
+use super::{Cell, Column, Run, Style, Table, asked_for, columns, read, write};
 use crate::arguments::Table as Typed;
 use crate::failure::{Failure, Outcome};
 use foldline::diagram::Point;
@@ -29,9 +29,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     }
     let run = read(&typed.folder, Part::Everything)?;
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
-    let asked = asked(typed, &run.model)?;
+    let asked = asked(&typed.force, typed.frequency.as_deref(), &run.model)?;
     let system = System::of_plan(&run.model, &run.plan);
-    let (mut rows, mut failed) = (Vec::new(), Vec::<(String, String, usize)>::new());
+    let (mut rows, mut failed) = (Vec::new(), Failed::default());
     for branch in run.diagram.branches.iter().filter(|branch| kept(branch)) {
         for point in &branch.points {
             let forcing = asked.at(point, &run.model)?;
@@ -39,10 +39,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
             let numbers = match &found {
                 Ok(found) => [&found.response[..], &[found.error, found.distance]].concat(),
                 Err(why) => {
-                    match failed.iter_mut().find(|(name, own, _)| *name == branch.name && own == why) {
-                        Some((.., count)) => *count += 1,
-                        None => failed.push((branch.name.clone(), why.clone(), 1)),
-                    }
+                    failed.add(&branch.name, why);
                     Vec::new()
                 }
             };
@@ -64,29 +61,66 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     write(&Table { columns: names, rows }, typed.format, &mut out)?;
     out.flush()?;
-    for (branch, why, count) in &failed {
-        let points = if *count == 1 { "1 point has".to_string() } else { format!("{count} points have") };
-        writeln!(stderr().lock(), "incomplete: {branch}: {points} no response: {why}")?;
-    }
-    Ok(if failed.is_empty() { Outcome::Done } else { Outcome::Short })
+    failed.report()
 }
 
-fn asked<'t>(typed: &'t Typed, model: &Model) -> Result<Asked<'t>, Failure> {
+/// Points without a response, counted by branch and reason.
+#[derive(Default)]
+struct Failed(Vec<(String, String, usize)>);
+
+impl Failed {
+    fn add(&mut self, branch: &str, why: &str) {
+        match self.0.iter_mut().find(|(name, own, _)| name == branch && own == why) {
+            Some((.., count)) => *count += 1,
+            None => self.0.push((branch.into(), why.into(), 1)),
+        }
+    }
+
+    fn report(&self) -> Result<Outcome, Failure> {
+        for (branch, why, count) in &self.0 {
+            let points = if *count == 1 { "1 point has".to_string() } else { format!("{count} points have") };
+            writeln!(stderr().lock(), "incomplete: {branch}: {points} no response: {why}")?;
+        }
+        Ok(if self.0.is_empty() { Outcome::Done } else { Outcome::Short })
+    }
+}
+
+/// Adds the responses to a run, as outputs NAME_response behind those of the model; reports the points that have none.
+pub fn add_responses(run: &mut Run, force: &[String], frequency: Option<&str>) -> Result<Outcome, Failure> {
+    let asked = asked(force, frequency, &run.model)?;
+    let (mut failed, system) = (Failed::default(), System::of_plan(&run.model, &run.plan));
+    for branch in &mut run.diagram.branches {
+        let special = branch.special.iter_mut().map(|special| (&mut special.point, false));
+        for (point, counts) in branch.points.iter_mut().map(|point| (point, true)).chain(special) {
+            let forcing = asked.at(point, &run.model)?;
+            match susceptibility(&run.model, &system.scales, point, &forcing) {
+                Ok(found) => point.ranges.extend(found.response.iter().map(|response| [*response, *response])),
+                Err(why) if counts => failed.add(&branch.name, &why),
+                Err(_) => {}
+            }
+        }
+    }
+    drop(system);
+    run.model = run.model.listing(run.model.states.iter().map(|state| format!("{}_response", state.name)));
+    failed.report()
+}
+
+fn asked<'t>(force: &'t [String], frequency: Option<&'t str>, model: &Model) -> Result<Asked<'t>, Failure> {
     let states = || model.states.iter().map(|state| state.name.as_str());
     let example = states().next_back().unwrap_or("x");
-    let Some(frequency) = typed.frequency.as_deref() else {
+    let Some(frequency) = frequency else {
         return Err(Failure::typed(
             "--susceptibility: the frequency of the forcing is missing",
             "add --frequency, an expression of parameters in radians per unit of time, such as --frequency Omega",
         ));
     };
-    if typed.force.is_empty() {
+    if force.is_empty() {
         let cure =
             format!("add --force {example}=1 for cos νt on the right-hand side of {example}, {example}=-i for sin νt");
         return Err(Failure::typed("--susceptibility: the forcing is missing", cure));
     }
     let mut forces = Vec::new();
-    for text in &typed.force {
+    for text in force {
         let cure = format!("write --force STATE=AMPLITUDE, for example --force {example}=1 or --force {example}=-i");
         let Some((name, amplitude)) = text.split_once('=') else {
             return Err(Failure::typed(format!("--force {text}: `=` is missing"), cure));

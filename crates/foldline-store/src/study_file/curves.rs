@@ -265,6 +265,8 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         (_, Some(Family::Arc)) => {
             Some(("solutions of boundary-value problems have only folds and branch points", "fold or branch-point"))
         }
+        (Kind::Fold, Some(Family::Torus)) => None,
+        (_, Some(Family::Torus)) => Some(("of tori only folds can be continued in two parameters", "fold")),
         (Kind::Hopf, Some(Family::Cycle)) => {
             Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }

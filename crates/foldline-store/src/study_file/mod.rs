@@ -337,7 +337,7 @@ fn with_contact(walk: &mut Walk, value: &Value, model: &Model) -> Option<Model> 
 /// Reports what is not supported with two forcing frequencies.
 fn one_forcing(walk: &mut Walk, root: &DeTable) {
     designs::refuse(walk, root, "models with two forcing frequencies");
-    for key in ["explore", "survey", "sweep", "curve", "homotopy", "map"] {
+    for key in ["explore", "survey", "sweep", "homotopy", "map"] {
         let Some((span, _)) = walk.tables(root, key).into_iter().next() else { continue };
         let message = format!("`{key}` is not supported for models with two forcing frequencies");
         walk.report(span, message, "follow the tori with `[[seed]]`, `attractor = \"torus\"`, and `[[branch]]`");

@@ -52,7 +52,7 @@ pub(super) fn weights(count: usize) -> Vec<f64> {
 }
 
 /// Weighted average of a sequence.
-pub(super) fn average(values: &[f64]) -> f64 {
+pub(crate) fn average(values: &[f64]) -> f64 {
     weights(values.len()).iter().zip(values).map(|(w, v)| w * v).sum()
 }
 

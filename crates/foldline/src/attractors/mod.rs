@@ -50,6 +50,7 @@ mod window;
 
 use angles::Rolled;
 pub(crate) use angles::gained;
+pub(crate) use birkhoff::average as weighted_average;
 pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 pub(crate) use census::PERSISTENT;

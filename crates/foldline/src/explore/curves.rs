@@ -20,10 +20,10 @@ const SHARPER: f64 = 0.2;
 /// # Errors
 /// A sentence that lists the special points of the branch, if none fits.
 pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoint, String> {
-    if branch.family == Family::Torus {
+    if branch.family == Family::Torus && plan.hold != Kind::Fold {
         return Err(format!(
-            "bifurcations of tori cannot be continued in two parameters ({} is a branch of tori)",
-            branch.name
+            "of tori only folds can be continued in two parameters ({} is a branch of tori, and `hold` is {})",
+            branch.name, plan.hold
         ));
     }
     let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);

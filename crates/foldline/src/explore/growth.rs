@@ -19,11 +19,11 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
-use crate::special::on_arcs::OnArcs;
 use crate::special::on_branch_points::OnBranchPoints;
 use crate::special::on_connections::{self, limit};
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::on_levels::{Corner, OnLevels};
+use crate::special::on_tangents::OnTangents;
 use crate::special::peak::Peak;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
@@ -138,7 +138,7 @@ pub fn held<'a>(system: &'a System, kind: Kind, axes: Vec<Axis>, degree: usize, 
         let cycle = mesh::at_least_some(cycle, degree);
         let own = UnfoldedCycles::setting(&setting, unfolded, &system.scales, &cycle);
         let condition: Box<dyn Condition + 'a> = match system.is_open() {
-            true => Box::new(OnArcs::new(kind, own.clone(), &cycle)?),
+            true => Box::new(OnTangents::new(kind, own.clone(), &cycle)?),
             false => Box::new(OnCycleBranchPoints::new(own.clone(), &cycle)),
         };
         let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len(), axes.len());

@@ -336,6 +336,14 @@ impl Model {
         self
     }
 
+    /// Copy that also lists numbers computed elsewhere, by name, behind its outputs. It serves to show them; as a vector field it
+    /// has no such outputs.
+    pub fn listing(&self, names: impl Iterator<Item = String>) -> Model {
+        let mut own = self.clone();
+        Arc::make_mut(&mut own.about).outputs.extend(names.map(|name| Output::new(&name, "")));
+        own
+    }
+
     /// Copy with other unit labels, by name; the name `period` sets the unit of time. Values are unchanged.
     pub(crate) fn labelled(&self, units: &[(String, String)]) -> Model {
         let mut model = self.clone();

@@ -2,7 +2,7 @@
 //!
 //! | on a curve of | kind | test function |
 //! |---|---|---|
-//! | folds | cusp | ⟨p, B(q, q)⟩, for maps as well; for cycles and boundary-value problems the slope in the first parameter, where it vanishes with that in the second |
+//! | folds | cusp | ⟨p, B(q, q)⟩, for maps as well; for cycles, tori and boundary-value problems the slope in the first parameter, where it vanishes with that in the second |
 //! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩, unless they are pitchforks throughout |
 //! | folds, branch points of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
 //! | folds, branch points of equilibria | zero-Hopf | sums of two of the other eigenvalues |
@@ -64,7 +64,7 @@ pub fn monitors<'a>(
     let kinds: &[Kind] = match (family, held) {
         (Family::Equilibrium, Fold | BranchPoint) => &[Cusp, BogdanovTakens, ZeroHopf],
         (Family::Equilibrium, Hopf) => &[BogdanovTakens, GeneralisedHopf, ZeroHopf, DoubleHopf],
-        (Family::Arc, Fold) => &[Cusp],
+        (Family::Arc | Family::Torus, Fold) => &[Cusp],
         (Family::Cycle, Fold) => &[Cusp, Resonance11, FoldFlip, FoldTorus],
         (Family::Cycle, PeriodDoubling) => &[GeneralisedPeriodDoubling, Resonance12, FoldFlip, FlipTorus],
         (Family::Cycle, Torus) => {

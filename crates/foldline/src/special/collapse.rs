@@ -134,7 +134,12 @@ impl Monitor for Narrows<'_> {
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         let (Some(a), Some(b)) = (Narrows::harmonic(reference), Narrows::harmonic(at)) else { return f64::NAN };
-        a.iter().zip(&b).zip(self.scales).map(|((a, b), s)| (a.conj() * b).re / (s * s)).sum()
+        let product = |b: &[Complex64]| -> f64 {
+            a.iter().zip(b).zip(self.scales).map(|((a, b), s)| (a.conj() * b).re / (s * s)).sum()
+        };
+        let size = product(&a);
+        // At a torus point itself, where the branch may begin, only rounding is left.
+        if size < LEFT * LEFT { 1.0 } else { product(&b) / size }
     }
 
     fn confirms(&self, at: &Point) -> bool {

@@ -1,12 +1,12 @@
 //! Defining system for each kind of bifurcation point.
 
-use super::on_arcs::OnArcs;
 use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
 use super::on_equilibria::OnEquilibria;
 use super::on_impacts::OnImpacts;
 use super::on_maps::OnMaps;
 use super::on_surfaces::OnSurfaces;
+use super::on_tangents::OnTangents;
 use crate::contract::Condition;
 use crate::diagram::{Cycle, Kind, Solution};
 use crate::problem::impact::stored::{hard, impacts};
@@ -25,7 +25,7 @@ pub fn condition<'a>(
     }
     match at {
         Solution::Cycle(arc) if setting.field.conditions() != [0, 0] => {
-            Some(Box::new(OnArcs::new(kind, setting, &mesh::at_least_some(arc, degree))?))
+            Some(Box::new(OnTangents::new(kind, setting, &mesh::at_least_some(arc, degree))?))
         }
         Solution::Cycle(cycle) if has_events(kind, &setting, cycle) => {
             Some(Box::new(OnImpacts::new(kind, setting, cycle)?))
@@ -39,6 +39,7 @@ pub fn condition<'a>(
         }
         Solution::Equilibrium(_) if kind == Kind::BranchPoint => Some(Box::new(OnBranchPoints::new(setting))),
         Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
+        Solution::Torus(torus) if kind == Kind::Fold => Some(Box::new(OnTangents::of_tori(setting, torus))),
         Solution::Torus(_) => None,
         Solution::Cycle(cycle) => Some(Box::new(OnCycles::new(kind, setting, &mesh::at_least_some(cycle, degree))?)),
     }

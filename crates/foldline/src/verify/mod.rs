@@ -12,6 +12,7 @@
 //! | cycles along which f or the state jumps | `located`, `jumping` |
 //! | single points | `points` |
 //! | cycles of maps, by the composed map | `maps` |
+//! | tori, by integration over a period and by long trajectories | `tori` |
 //! | positions of special points | `special`, `touching` |
 //! | changes of stability | `record` |
 //!
@@ -28,6 +29,7 @@ mod shooting;
 mod special;
 #[cfg(test)]
 mod tests;
+mod tori;
 mod touching;
 mod variational;
 
@@ -53,13 +55,17 @@ pub enum Quantity {
     Place,
     /// Instants of the events of a cycle, relative to the period; infinite if their number differs.
     Events,
+    /// Rotation number of a torus, relative to 1 + its size.
+    Rotation,
+    /// Distance of a long trajectory from a torus, relative to the scales of the states.
+    Distance,
     /// Discrepancy in the number of unstable multipliers from one point to the next.
     Record,
 }
 
 impl Quantity {
     /// All quantities.
-    pub const ALL: [Quantity; 8] = [
+    pub const ALL: [Quantity; 10] = [
         Quantity::Profile,
         Quantity::Period,
         Quantity::Range,
@@ -67,6 +73,8 @@ impl Quantity {
         Quantity::Stability,
         Quantity::Place,
         Quantity::Events,
+        Quantity::Rotation,
+        Quantity::Distance,
         Quantity::Record,
     ];
 
@@ -80,6 +88,8 @@ impl Quantity {
             Quantity::Stability => "stability",
             Quantity::Place => "location",
             Quantity::Events => "events",
+            Quantity::Rotation => "rotation",
+            Quantity::Distance => "distance",
             Quantity::Record => "consistency",
         }
     }
@@ -187,27 +197,16 @@ pub fn verify(
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
         let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
-        if branch.family == Family::Torus {
-            let why = "tori are not recomputed yet";
-            let undecided = |position: i64, special: Option<Kind>| Undecided {
-                branch: branch.name.clone(),
-                position,
-                special,
-                why,
-            };
-            out.undecided.extend(chosen.iter().map(|i| undecided(branch.points[*i].position, None)));
-            out.undecided.extend(branch.special.iter().map(|own| undecided(own.point.position, Some(own.kind))));
-            continue;
-        }
         if system.is_open() || connecting {
             out.add(arcs::verify(system, branch, &chosen, accuracies(tolerance)[0]));
             continue;
         }
         let setting = setting(system, branch);
-        match system.field.iterated() {
-            true => out.add(maps::points(&setting, branch, &chosen)),
-            false => out.add(points::verify(system, &setting, branch, &chosen, tolerance)),
-        }
+        out.add(match system.field.iterated() {
+            true => maps::points(&setting, branch, &chosen),
+            false if branch.family == Family::Torus => tori::verify(system, &setting, branch, &chosen, tolerance),
+            false => points::verify(system, &setting, branch, &chosen, tolerance),
+        });
         out.add(special::verify(&setting, branch, tolerance));
         // Along a curve in two parameters stability also changes at codimension-two points that are not located.
         if branch.held.is_none() {

@@ -55,9 +55,9 @@ pub(super) fn verify(
 }
 
 pub(super) struct Part<'a> {
-    system: &'a System<'a>,
+    pub(super) system: &'a System<'a>,
     pub(super) setting: &'a Setting<'a>,
-    branch: &'a Branch,
+    pub(super) branch: &'a Branch,
 }
 
 impl Part<'_> {
@@ -183,12 +183,12 @@ impl Part<'_> {
         out.checks.push(self.check(point, Quantity::Stability, Some(noise), side));
     }
 
-    /// True if the branch ends at this point on another one: branches of doubled cycles have a point there.
-    fn joins(&self, point: &Point) -> bool {
+    /// True if the branch ends at this point on another one: branches of doubled cycles and of tori have a point there.
+    pub(super) fn joins(&self, point: &Point) -> bool {
         let ends = [self.branch.points.first(), self.branch.points.last()];
         ends.iter().zip(&self.branch.ends).any(|(end, why)| {
             end.is_some_and(|end| end.position == point.position)
-                && matches!(why, Some(Ending::Joined { at: Kind::PeriodDoubling, .. }))
+                && matches!(why, Some(Ending::Joined { at: Kind::PeriodDoubling | Kind::Torus, .. }))
         })
     }
 

@@ -32,12 +32,12 @@ use num_complex::Complex64;
 /// Number of segments of a cycle.
 const SEGMENTS: usize = 16;
 /// Updates relative to the size of the cycle at which Newton's method has converged …
-const ARRIVED: f64 = 1e-9;
+pub(super) const ARRIVED: f64 = 1e-9;
 /// … and below which it may end once they stop decreasing: only the error of the integration remains.
-const STALLED: f64 = 1e-5;
-const ITERATIONS: usize = 6;
+pub(super) const STALLED: f64 = 1e-5;
+pub(super) const ITERATIONS: usize = 6;
 /// Maximum number of steps of an integration.
-const STEPS: usize = 2_000_000;
+pub(super) const STEPS: usize = 2_000_000;
 
 /// Cycle represented by its nodes.
 #[derive(Clone, Debug)]
@@ -234,7 +234,10 @@ impl Shooting<'_> {
     /// Flow along an orbit through its jumps; `None` if the integration fails.
     pub(super) fn through_jumps(&self, orbit: &Orbit, ignored: Option<Ignored>) -> Option<Flow> {
         let (n, scales) = (orbit.dim(), &orbit.scales);
-        let tolerance = Tolerance { relative: self.accuracy, absolute: self.absolute() };
+        let tolerance = Tolerance {
+            relative: self.accuracy,
+            absolute: Variational { setting: self.setting }.absolute(self.accuracy),
+        };
         let (parameters, forced) = (self.setting.at(&orbit.free), orbit.forced);
         let located = Located { setting: self.setting, parameters, tolerance, forced, ignored };
         let (mut flow, times) = (Flow::default(), orbit.times());
@@ -250,16 +253,6 @@ impl Shooting<'_> {
         flow.begins = self.slopes(&orbit.nodes, &times, orbit);
         flow.finishes = self.slopes(&flow.ends, &times[1..], orbit);
         Some(flow)
-    }
-
-    /// Errors accepted in the states, their derivatives and the clock.
-    fn absolute(&self) -> Vec<f64> {
-        let (n, k, scales) = (self.setting.field.dim(), self.setting.freedom(), self.setting.scales);
-        let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
-        let by_free = (0..n * k).map(|at| scales[at / k.max(1)]);
-        let clock = self.setting.field.forced().then_some(1.0);
-        let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
-        absolute.map(|s| s * self.accuracy).collect()
     }
 
     /// Flow along each orbit; `None` if the integration fails. `sample` sees every step of every orbit.
@@ -279,7 +272,7 @@ impl Shooting<'_> {
                 owners.push(index);
             }
         }
-        let tolerance = Tolerance { relative: self.accuracy, absolute: self.absolute() };
+        let tolerance = Tolerance { relative: self.accuracy, absolute: field.absolute(self.accuracy) };
         let ensemble = Ensemble::with_own_parameters(&field, &parameters, tolerance, &starts, [0.0, 1.0]);
         let arrivals = ensemble.with_step_limit(STEPS).run(&mut |step| {
             sample(owners[step.trajectory()], step);

@@ -15,11 +15,12 @@
 //!   grazing           (6)  the extremum of the switch on orbits that do not meet its surface there
 //! ```
 //!
-//! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0.
+//! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0. For tori the moduli of the multipliers are recomputed, and
+//! their arguments are those of the special point.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
 use super::touching::Touch;
-use super::{Check, Quantity, Undecided, Verified, accuracies, maps};
+use super::{Check, Quantity, Undecided, Verified, accuracies, maps, tori};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
@@ -170,7 +171,14 @@ impl Place<'_> {
     fn solutions(&self, nodes: &[f64; 4]) -> Result<Option<Vec<Nearby>>, &'static str> {
         match &self.special.point.solution {
             Solution::Equilibrium(x) => Ok(self.equilibria(x, nodes)),
-            Solution::Torus(_) => Err("tori are not recomputed"),
+            Solution::Torus(_) if self.special.kind == Kind::BranchPoint => {
+                Err("branch points of tori are not located again")
+            }
+            Solution::Torus(_) => {
+                let around = tori::beside(self.setting, &self.special.point, nodes, self.accuracy)?;
+                let nearby = |(parameter, slope, spectrum)| Nearby { parameter, slope, spectrum, touch: 0.0 };
+                Ok(around.map(|all| all.into_iter().map(nearby).collect()))
+            }
             Solution::Cycle(_) if self.special.point.is_light() => Err("its profile was not stored"),
             Solution::Cycle(_) if self.setting.field.iterated() => {
                 if !maps::recomputes(self.special.kind) {

@@ -24,6 +24,16 @@ impl Variational<'_> {
     fn sizes(&self) -> [usize; 2] {
         [self.setting.field.dim(), self.setting.freedom()]
     }
+
+    /// Errors accepted in the states, their derivatives and the clock.
+    pub(super) fn absolute(&self, accuracy: f64) -> Vec<f64> {
+        let ([n, k], scales) = (self.sizes(), self.setting.scales);
+        let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
+        let by_free = (0..n * k).map(|at| scales[at / k.max(1)]);
+        let clock = self.setting.field.forced().then_some(1.0);
+        let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
+        absolute.map(|s| s * accuracy).collect()
+    }
 }
 
 impl VectorField for Variational<'_> {

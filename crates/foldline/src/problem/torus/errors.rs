@@ -1,7 +1,9 @@
 //! Error estimates of a torus, and meshes in time and phase that meet a tolerance.
 //!
 //! **Idea.** In time the defect of every segment is measured as for a cycle, and its effect on the torus follows from the
-//! joined system. In the phase the truncated Fourier series shows its error by its last terms, as long as they decay.
+//! joined system. In the phase the truncated Fourier series shows its error by its last terms, as long as they decay. They act on the torus
+//! like a defect of the closure, so that their effect too follows from the joined system: it is large where ρ is close to a ratio of small
+//! numbers.
 //!
 //! **Source.** enright2000 (defect); trefethen2000, §4 (decay of the coefficients).
 
@@ -30,8 +32,12 @@ pub(super) struct Measured {
     at: Vec<f64>,
     /// `[N]`: errors on the intervals, over all segments.
     time: Vec<f64>,
+    /// First-order change of the unknowns by the errors in time and in the phase.
+    shift: Vec<f64>,
     /// `[harmonics + 1]`: largest modulus of this or a higher harmonic, relative to the scales.
     envelope: Vec<f64>,
+    /// Effect of the last harmonics on the torus, relative to their size; at least 1.
+    gain: f64,
 }
 
 /// A larger odd number of phases, within the limit.
@@ -40,15 +46,15 @@ pub(super) fn more_phases(count: usize) -> usize {
 }
 
 impl Measured {
-    /// Error by truncation: the last two harmonics.
+    /// Error by truncation: the effect of the last two harmonics.
     fn tail(&self) -> f64 {
         let last = self.envelope.len() - 1;
-        self.envelope[last.saturating_sub(1)]
+        self.gain * self.envelope[last.saturating_sub(1)]
     }
 
-    /// Number of harmonics at which the tail would be `target`.
+    /// Number of harmonics at which the error by truncation would be `target`.
     fn needed(&self, target: f64) -> usize {
-        let last = self.envelope.len() - 1;
+        let (last, target) = (self.envelope.len() - 1, target / self.gain);
         if let Some(enough) = self.envelope.iter().position(|e| *e <= target) {
             return enough + 2;
         }
@@ -61,7 +67,7 @@ impl Measured {
 }
 
 /// Moduli of the harmonics 0 … (K - 1) / 2 of values `[K]`.
-pub(super) fn harmonics(values: impl Iterator<Item = f64>) -> Vec<f64> {
+pub(crate) fn harmonics(values: impl Iterator<Item = f64>) -> Vec<f64> {
     let mut all: Vec<Complex64> = values.map(Complex64::from).collect();
     let count = all.len();
     foldline_general::fourier(&mut all);
@@ -109,13 +115,48 @@ impl TorusProblem<'_> {
         for j in (1..envelope.len()).rev() {
             envelope[j - 1] = larger(envelope[j - 1], envelope[j]);
         }
-        Measured { at: u.to_vec(), time, envelope }
+        let (gain, by_tail) = self.effect_of_tail(u, &scale);
+        shift.iter_mut().zip(&by_tail).for_each(|(all, own)| *all += own);
+        Measured { at: u.to_vec(), time, shift, envelope, gain }
+    }
+
+    /// Change of the torus by a defect of the closure that consists of the last two harmonics of the curve, and before it its
+    /// largest value relative to that defect, at least 1.
+    fn effect_of_tail(&self, u: &[f64], scale: &[f64]) -> (f64, Vec<f64>) {
+        let (n, size, count) = (self.n, self.profile_size(), self.phases);
+        let block = (self.scheme.degree + 1) * n;
+        let last = (self.intervals() - 1) * block;
+        let low = phases::passage(count, (count - 4).max(1));
+        let back = phases::passage((count - 4).max(1), count);
+        let apply = |matrix: &[f64], from: usize, values: &[f64]| -> Vec<f64> {
+            matrix.chunks_exact(from).map(|row| row.iter().zip(values).map(|(w, x)| w * x).sum()).collect()
+        };
+        let (mut rhs, mut own) = (vec![0.0; u.len()], vec![vec![0.0; size / count]; count]);
+        let mut most = 0.0;
+        for c in 0..n {
+            let values: Vec<f64> = u[c..count * n].iter().step_by(n).copied().collect();
+            let smooth = apply(&back, (count - 4).max(1), &apply(&low, count, &values));
+            for (own, (x, smooth)) in own.iter_mut().zip(values.iter().zip(&smooth)) {
+                own[last + c] = x - smooth;
+                most = larger(most, ((x - smooth) / scale[c]).abs());
+            }
+        }
+        own.iter().enumerate().for_each(|(k, chain)| self.put(chain, k, &mut rhs));
+        let mut shift = vec![0.0; u.len()];
+        self.solve_joined(&rhs, &mut shift);
+        let response = self.relative_size(&shift, u) / most;
+        if response.is_finite() { (response.max(1.0), shift) } else { (1.0, vec![0.0; u.len()]) }
     }
 
     /// The stated error at `u`: four times the larger of the estimates in time and in the phase.
     pub(super) fn stated_error(&self, u: &[f64]) -> f64 {
         let most = |known: &Measured| known.time.iter().fold(known.tail(), |most, e| larger(most, *e));
         SAFE * self.measured_at(u, most) + ROUNDING
+    }
+
+    /// `u` without its estimated error, to first order.
+    pub(super) fn corrected(&self, u: &[f64]) -> Vec<f64> {
+        self.measured_at(u, |known| u.iter().zip(&known.shift).map(|(u, d)| u - d).collect())
     }
 
     /// See [`ZeroProblem::better_mesh`].

@@ -34,6 +34,7 @@ mod joint;
 pub mod phases;
 mod stability;
 pub mod start;
+pub mod summit;
 mod surface;
 
 use super::cycle::CycleProblem;
@@ -43,6 +44,7 @@ use crate::contract::{Examination, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Symmetry, Torus, Trust};
 use crate::linalg::{all_finite, larger, same};
 pub use errors::LARGEST;
+pub(crate) use errors::harmonics;
 use joint::Joint;
 use std::cell::RefCell;
 
@@ -103,6 +105,16 @@ impl<'a> TorusProblem<'a> {
         problem
     }
 
+    /// Segment k on the current mesh.
+    fn segment(&self, k: usize) -> CycleProblem<'a> {
+        let mut setting = self.setting.clone();
+        if let Some(phase) = self.second {
+            setting.parameters[phase] += k as f64 / self.phases as f64;
+        }
+        let rows = self.phase_count() + self.setting.freedom().max(1);
+        CycleProblem::segment(setting, self.scheme.degree, &self.time, self.forcing_periods, rows)
+    }
+
     fn intervals(&self) -> usize {
         self.time.len() - 1
     }
@@ -118,9 +130,10 @@ impl<'a> TorusProblem<'a> {
 
     /// The profile of segment k, `[N][m + 1][n]`.
     fn chain(&self, v: &[f64], k: usize) -> Vec<f64> {
-        let width = self.phases * self.n;
-        let own = v[..self.profile_size()].chunks_exact(width);
-        own.flat_map(|node| &node[k * self.n..(k + 1) * self.n]).copied().collect()
+        let (n, width, size) = (self.n, self.phases * self.n, self.profile_size());
+        let mut own = Vec::with_capacity(size / self.phases + 1 + self.setting.freedom());
+        v[..size].chunks_exact(width).for_each(|node| own.extend_from_slice(&node[k * n..(k + 1) * n]));
+        own
     }
 
     /// Writes the profile of segment k to `v`.
@@ -302,21 +315,16 @@ impl ZeroProblem for TorusProblem<'_> {
             return;
         }
         let (time, count) = (phases::in_time(mesh), phases::count(mesh));
-        let (degree, rows) = (self.scheme.degree, self.phase_count() + 1);
         if self.second.is_some() && count != self.phases {
             self.segments.clear();
         }
+        (self.mesh, self.time, self.phases) = (mesh.clone(), time.clone(), count);
         self.segments.truncate(count);
         self.segments.iter_mut().for_each(|own| own.move_to(&time));
         while self.segments.len() < count {
-            let mut setting = self.setting.clone();
-            if let Some(phase) = self.second {
-                setting.parameters[phase] += self.segments.len() as f64 / count as f64;
-            }
-            let own = CycleProblem::segment(setting, degree, &time, self.forcing_periods, rows);
+            let own = self.segment(self.segments.len());
             self.segments.push(own);
         }
-        (self.mesh, self.time, self.phases) = (mesh.clone(), time, count);
         (self.joint, self.anchored, self.directions) = (None, Vec::new(), Vec::new());
         self.measured.replace(None);
     }
@@ -363,8 +371,8 @@ impl ZeroProblem for TorusProblem<'_> {
         found
     }
 
-    fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
-        self.spectrum_doubt()
+    fn spectrum_error(&mut self, u: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
+        self.spectrum_doubt(u)
     }
 
     fn margin(&self, at: &Point) -> f64 {

@@ -26,6 +26,7 @@ use super::TorusProblem;
 use super::phases;
 use crate::contract::Examination;
 use crate::diagram::Trust;
+use crate::linalg::larger;
 use foldline_general::Mat;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -48,7 +49,8 @@ impl TorusProblem<'_> {
             trivial: trivial + given,
             ..Examination::default()
         };
-        let Some(mut found) = self.representatives() else { return unknown() };
+        let found = self.transitions().and_then(|all| self.representatives(&all, self.turn));
+        let Some(mut found) = found else { return unknown() };
         for at in 0..trivial.min(found.len()) {
             let off = |z: &Complex64| (z - 1.0).norm();
             let best = (at..found.len()).min_by(|a, b| off(&found[*a]).total_cmp(&off(&found[*b])));
@@ -69,19 +71,56 @@ impl TorusProblem<'_> {
         Examination { spectrum: found, trivial, unstable, trust, ..Examination::default() }
     }
 
-    /// Estimated error of the multipliers: the defects of those that are known.
-    pub(super) fn spectrum_doubt(&self) -> f64 {
-        let trust = self.spectrum().trust;
-        SAFE * (trust.trivial_defect + trust.liouville_defect) + ROUNDING
+    /// Estimated error of the multipliers at `u`: the defects of those that are known, and the change of their moduli if the torus
+    /// is corrected. The defects alone do not show the error of the torus itself, to which multipliers react strongly near
+    /// folds.
+    pub(super) fn spectrum_doubt(&self, u: &[f64]) -> f64 {
+        let found = self.spectrum();
+        let there = self.corrected(u);
+        let moduli = |all: Vec<Complex64>| {
+            let mut moduli: Vec<f64> = all.iter().map(|z| z.norm()).collect();
+            moduli.sort_by(|a, b| b.total_cmp(a));
+            moduli
+        };
+        let second = usize::from(self.second.is_some());
+        let change = match self
+            .transitions_at(&there)
+            .and_then(|all| self.representatives(&all, there[self.profile_size() + 1]))
+        {
+            Some(other) => moduli(found.spectrum[second..].to_vec())
+                .iter()
+                .zip(moduli(other))
+                .fold(0.0, |most, (a, b)| larger(most, (a - b).abs() / a.max(1.0))),
+            None => f64::NAN,
+        };
+        SAFE * (found.trust.trivial_defect + found.trust.liouville_defect + change) + ROUNDING
     }
 
-    /// One multiplier of each family.
-    fn representatives(&self) -> Option<Vec<Complex64>> {
+    /// Transition matrices of the segments at the last factorisation.
+    fn transitions(&self) -> Option<Vec<Vec<f64>>> {
+        self.segments.iter().map(|segment| segment.remainder()?.transition().ok()).collect()
+    }
+
+    /// Transition matrices of the segments at `u`; the last factorisation is kept.
+    fn transitions_at(&self, u: &[f64]) -> Option<Vec<Vec<f64>>> {
+        let mut own = self.segment(0);
+        (0..self.phases)
+            .map(|k| {
+                if self.second.is_some() {
+                    own = self.segment(k);
+                }
+                own.segment_factorise(&self.of_segment(u, k), &[], &self.scale).ok()?;
+                own.remainder()?.transition().ok()
+            })
+            .collect()
+    }
+
+    /// One multiplier of each family, for transition matrices and ρ.
+    fn representatives(&self, transitions: &[Vec<f64>], turn: f64) -> Option<Vec<Complex64>> {
         let (n, count) = (self.n, self.phases);
-        let [table, _] = phases::shift(count, -self.turn);
+        let [table, _] = phases::shift(count, -turn);
         let mut operator: Mat<f64> = Mat::zeros(count * n, count * n);
-        for (l, segment) in self.segments.iter().enumerate() {
-            let own = segment.remainder()?.transition().ok()?;
+        for (l, own) in transitions.iter().enumerate() {
             for (i, c) in (0..n * n).map(|at| (at / n, at % n)) {
                 let entry = own[i * n + c] * self.scale[c] / self.scale[i];
                 for k in 0..count {

@@ -4,38 +4,12 @@
 //! the interpolant. The trajectory from phase φ continues beyond t = 1 as the one from φ + ρ.
 
 use super::TorusProblem;
-use super::phases;
 use super::start::transferred;
+use super::{phases, summit};
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::diagram::{Point, Solution, Symmetry};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
-
-/// Rounds of improvement of a largest value; each divides the spacing by [`FINER`].
-const ROUNDS: usize = 6;
-const FINER: f64 = 4.0;
-/// Largest number of steps, and the longest of them in spacings.
-const STEPS: usize = 100;
-const FARTHEST: f64 = 2.0;
-
-/// Number of local maxima of the grid that are improved: the highest of the grid may not be the highest hill.
-const HILLS: usize = 6;
-
-/// Places of the highest local maxima of a sign times values `[time][fine]`, the highest first.
-fn hills(line: &[f64], sign: f64, fine: usize) -> Vec<usize> {
-    let value = |at: usize| sign * line[at];
-    let higher = |at: usize| {
-        let (node, k) = (at / fine, at % fine);
-        let beside = [node * fine + (k + 1) % fine, node * fine + (k + fine - 1) % fine];
-        let in_time = [at.checked_sub(fine), Some(at + fine).filter(|next| *next < line.len())];
-        let neighbours = beside.into_iter().chain(in_time.into_iter().flatten());
-        neighbours.into_iter().all(|other| value(other) <= value(at))
-    };
-    let mut found: Vec<usize> = (0..line.len()).filter(|at| higher(*at)).collect();
-    found.sort_by(|a, b| value(*b).total_cmp(&value(*a)));
-    found.truncate(HILLS);
-    found
-}
 
 impl TorusProblem<'_> {
     /// Smallest and largest value, and mean and mean square, of every state, then of every output.
@@ -60,14 +34,14 @@ impl TorusProblem<'_> {
             }
         }
         let all = self.channels(states, &times, &parameters);
-        let spacing = [1.0 / fine as f64, 0.5 / (self.intervals() * m) as f64];
+        let grid = [fine as f64, 0.5 / (self.intervals() * m) as f64];
         let ranges = all.chunks_exact(lanes).enumerate().map(|(channel, line)| {
             [-1.0, 1.0].map(|sign| {
-                let improved = hills(line, sign, fine).into_iter().map(|at| {
-                    let place = [(at % fine) as f64 / fine as f64, times[at]];
-                    self.improved(u, &parameters, channel, sign, place, spacing)
-                });
-                sign * improved.fold(f64::NAN, f64::max)
+                let value = |at: [f64; 2]| {
+                    let all = self.channels(self.state(u, at), &[at[1] - at[1].floor()], &parameters);
+                    sign * all[channel]
+                };
+                sign * summit::largest(line, &times, sign, grid, &value)
             })
         });
         let weight = |at: usize| {
@@ -107,54 +81,6 @@ impl TorusProblem<'_> {
         let s = (t - self.time[j]) / (self.time[j + 1] - self.time[j]);
         self.scheme.value_into(s, &u[j * block..(j + 1) * block], &mut section);
         phases::between(&section, self.n, turns)
-    }
-
-    /// The largest value of a channel times a sign, next to a place.
-    fn improved(
-        &self,
-        u: &[f64],
-        parameters: &[f64],
-        channel: usize,
-        sign: f64,
-        mut place: [f64; 2],
-        mut spacing: [f64; 2],
-    ) -> f64 {
-        let value = |at: [f64; 2]| {
-            let all = self.channels(self.state(u, at), &[at[1] - at[1].floor()], parameters);
-            sign * all[channel]
-        };
-        let (mut best, mut rounds) = (value(place), 0);
-        for _ in 0..STEPS {
-            let [h, k] = spacing;
-            let at = |a: f64, b: f64| value([place[0] + a * h, place[1] + b * k]);
-            let (right, left, up, down) = (at(1.0, 0.0), at(-1.0, 0.0), at(0.0, 1.0), at(0.0, -1.0));
-            let mixed = 0.25 * (at(1.0, 1.0) + at(-1.0, -1.0) - at(1.0, -1.0) - at(-1.0, 1.0));
-            let (gx, gy) = (0.5 * (right - left), 0.5 * (up - down));
-            let (xx, yy) = (right - 2.0 * best + left, up - 2.0 * best + down);
-            let det = xx * yy - mixed * mixed;
-            let step = match det > 0.0 && xx < 0.0 {
-                true => [(mixed * gy - yy * gx) / det, (mixed * gx - xx * gy) / det],
-                false => [gx, gy].map(|g| if g == 0.0 { 0.0 } else { g.signum() }),
-            };
-            // A quantity that hardly depends on one of the frequencies has a ridge across the grid: the way along it is long.
-            let longest = step[0].abs().max(step[1].abs());
-            let step = step.map(|s| s * (FARTHEST / longest).min(1.0));
-            let next = [place[0] + step[0] * h, place[1] + step[1] * k];
-            let found = value(next);
-            let higher = found > best;
-            if higher {
-                (best, place) = (found, next);
-            }
-            if higher && longest > FARTHEST {
-                continue;
-            }
-            spacing = spacing.map(|s| s / FINER);
-            rounds += 1;
-            if rounds == ROUNDS {
-                break;
-            }
-        }
-        best
     }
 
     /// Copies of a point under a symmetry, in the phase in which they are closest to `beside`. Without forcing the time

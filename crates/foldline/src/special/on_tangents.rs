@@ -1,4 +1,4 @@
-//! Defining systems of folds and branch points of boundary-value problems.
+//! Defining systems of folds and branch points of boundary-value problems, and of folds of tori.
 //!
 //! **Idea.** λ is a direction in the plane of the two parameters, across the curve. At a fold the tangent of the branch
 //! over λ has no component along λ. Where branches over λ cross, the equations have two tangents, and a left null vector;
@@ -18,24 +18,25 @@
 //! **Source.** govaerts2000, §3 and §4 (bordered matrices, folds), §6 (branch points).
 //!
 //! **Departures.** C and λ are updated at every accepted point. Derivatives of g are central differences: the second
-//! derivatives of the conditions are not available. They only guide Newton's method, and g itself is computed to rounding.
+//! derivatives of the conditions of a boundary-value problem and of the rotation of a torus are not available. They only guide Newton's method, and g itself is computed to rounding.
 
 use crate::contract::{Condition, ZeroProblem};
-use crate::diagram::{Cycle, Kind, Mesh, Point};
+use crate::diagram::{Cycle, Kind, Mesh, Point, Torus};
 use crate::linalg::{axpy, max_abs};
 use crate::problem::Setting;
 use crate::problem::cycle::CycleProblem;
+use crate::problem::torus::TorusProblem;
 use num_complex::Complex64;
 
 /// Relative size of the steps of differences: the cube root of the relative rounding error of g, up to a factor of order
 /// 1, balances truncation and rounding.
 const STEP: f64 = 2e-5;
 
-/// Condition for folds or branch points of boundary-value problems.
-pub struct OnArcs<'a> {
-    problem: CycleProblem<'a>,
+/// Condition for folds or branch points of boundary-value problems, or for folds of tori.
+pub struct OnTangents<'a> {
+    problem: Box<dyn ZeroProblem + 'a>,
     kind: Kind,
-    /// Position of b among the unknowns behind the profile and its duration.
+    /// Position of b, counted from the last unknown.
     amplitude: usize,
     /// Direction of λ in the two free parameters.
     across: [f64; 2],
@@ -46,23 +47,26 @@ pub struct OnArcs<'a> {
     at: Vec<f64>,
 }
 
-impl<'a> OnArcs<'a> {
+impl<'a> OnTangents<'a> {
     /// Creates the condition on the mesh of `arc`; `None` for kinds that boundary-value problems do not have. For branch
     /// points the first free parameter of the setting is the amplitude of the unfolding.
-    pub fn new(kind: Kind, setting: Setting<'a>, arc: &Cycle) -> Option<OnArcs<'a>> {
+    pub fn new(kind: Kind, setting: Setting<'a>, arc: &Cycle) -> Option<OnTangents<'a>> {
         if !matches!(kind, Kind::Fold | Kind::BranchPoint) {
             return None;
         }
         let problem = CycleProblem::like(setting, arc);
-        Some(OnArcs {
-            problem,
-            kind,
-            amplitude: 1,
-            across: [1.0, 0.0],
-            rows: Vec::new(),
-            null: Vec::new(),
-            at: Vec::new(),
-        })
+        let amplitude = problem.unknowns() - problem.profile_size() - 1;
+        Some(OnTangents::on(Box::new(problem), kind, amplitude))
+    }
+
+    /// Creates the condition for folds of tori, in the phases and on the mesh of `torus`.
+    pub fn of_tori(setting: Setting<'a>, torus: &Torus) -> OnTangents<'a> {
+        OnTangents::on(Box::new(TorusProblem::like(setting, torus, None)), Kind::Fold, 0)
+    }
+
+    fn on(problem: Box<dyn ZeroProblem + 'a>, kind: Kind, amplitude: usize) -> OnTangents<'a> {
+        let (across, rows, null, at) = ([1.0, 0.0], Vec::new(), Vec::new(), Vec::new());
+        OnTangents { problem, kind, amplitude, across, rows, null, at }
     }
 
     /// Number of tangents.
@@ -89,14 +93,14 @@ impl<'a> OnArcs<'a> {
             self.problem.solve(&one, v);
             g[k] = match self.kind {
                 Kind::Fold => self.across[0] * v[size - 2] + self.across[1] * v[size - 1],
-                _ => v[self.problem.profile_size() + self.amplitude],
+                _ => v[size - self.amplitude],
             };
         }
         (max_abs(&all).is_finite() && g.iter().all(|g| g.is_finite())).then_some(all)
     }
 }
 
-impl Condition for OnArcs<'_> {
+impl Condition for OnTangents<'_> {
     fn kind(&self) -> Kind {
         self.kind
     }
