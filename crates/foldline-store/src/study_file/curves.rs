@@ -27,7 +27,7 @@ pub(super) const KEYS: [&str; 14] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 10] = [
+const HELD: [Kind; 11] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -38,6 +38,7 @@ const HELD: [Kind; 10] = [
     Kind::BoundaryEquilibrium,
     Kind::Homoclinic,
     Kind::Heteroclinic,
+    Kind::SaddleNodeHomoclinic,
 ];
 
 /// Branch on which the special point lies.
@@ -49,6 +50,8 @@ pub(super) struct Base {
     pub(super) beginning: Vec<Option<f64>>,
     /// Equilibria or cycles, if known.
     pub(super) family: Option<Family>,
+    /// For a curve, what it holds, and its second parameter.
+    curve: Option<(Kind, usize)>,
 }
 
 /// Reads a curve and adds its plan to the items read so far.
@@ -117,7 +120,7 @@ pub(super) fn read(
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus | Kind::Grazing | Kind::ImpactGrazing => Some(Family::Cycle),
-        Kind::Homoclinic | Kind::Heteroclinic => Some(Family::Arc),
+        Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic => Some(Family::Arc),
         Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
     };
@@ -137,6 +140,9 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     if let Some((known, rest)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
         return match known.start {
             Start::EndOf(index) => switched(walk, value, of_branch(ground, known, index), known, rest),
+            Start::EndOfCurve(index) if rest.is_empty() && starts_on_curve(item, &ground.items.curves[index]) => {
+                of_curve(ground, known, index)
+            }
             _ => {
                 let (short, noun) = (&known.name, with_article(noun(&known.start)));
                 let message = format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch");
@@ -159,9 +165,43 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     None
 }
 
+/// True if the curve of this item can start at a point of codimension two of another curve.
+fn starts_on_curve(item: &Item, other: &CurvePlan) -> bool {
+    let hold = item.table.get("hold").and_then(|value| value.get_ref().as_str()).and_then(Kind::from_name);
+    matches!(
+        (other.hold, hold),
+        (Kind::Homoclinic, Some(Kind::SaddleNodeHomoclinic))
+            | (Kind::SaddleNodeHomoclinic | Kind::Fold | Kind::Hopf, Some(Kind::Homoclinic))
+    )
+}
+
+/// The base of a curve that starts on another one: its branch, under its name and in its range.
+fn of_curve(ground: &Ground, known: &Known, index: usize) -> Option<Base> {
+    let curve = &ground.items.curves[index];
+    let own = |name: &str| {
+        // A switched branch is followed in the parameter of the branch it comes from.
+        let ends = || std::iter::once(name.len()).chain(name.rmatch_indices('/').map(|(end, _)| end));
+        ends().find_map(|end| ground.known(&name[..end]))
+    };
+    let parent = own(&curve.of)?;
+    let below = match parent.start {
+        Start::EndOf(index) => of_branch(ground, parent, index),
+        Start::EndOfCurve(index) => of_curve(ground, parent, index)?,
+        _ => return None,
+    };
+    let plan = BranchPlan { range: curve.ranges[0], ..below.plan };
+    Some(Base {
+        name: known.name.clone(),
+        plan,
+        beginning: known.beginning.clone(),
+        family: None,
+        curve: Some((curve.hold, curve.free)),
+    })
+}
+
 pub(super) fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
     let plan = ground.items.branches[index].clone();
-    Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family }
+    Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family, curve: None }
 }
 
 /// Applies the branch switches `/kind-number` in `steps` to a branch; without steps, returns the branch itself.
@@ -213,6 +253,10 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     };
     let wrong = match (kind, family) {
         (Kind::Fold | Kind::BranchPoint, Some(Family::Arc)) => None,
+        (Kind::SaddleNodeHomoclinic, Some(Family::Equilibrium)) => Some((
+            "orbits homoclinic to a saddle-node are not searched for from equilibria",
+            "homoclinic, or `of` a branch of cycles that ends at such an orbit",
+        )),
         (_, Some(Family::Arc)) => {
             Some(("solutions of boundary-value problems have only folds and branch points", "fold or branch-point"))
         }
@@ -358,6 +402,13 @@ fn second(walk: &mut Walk, item: &Item, ground: &Ground, base: Option<&Base>) ->
             None => "a curve needs a model with two parameters".to_string(),
         };
         walk.report(value.span(), message, right);
+        return None;
+    }
+    let other = base.and_then(|base| Some((base, base.curve?.1))).filter(|(_, other)| *other != second);
+    if let Some(((base, other), value)) = other.zip(item.table.get("free")) {
+        let names = [base.plan.free, other].map(|index| &ground.model.parameters[index].name);
+        let message = format!("the curve \"{}\" lies in the plane of {} and {}", base.name, names[0], names[1]);
+        walk.report(value.span(), message, format!("the second parameter of that curve, `{}`", names[1]));
         return None;
     }
     Some(second)

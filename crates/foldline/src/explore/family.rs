@@ -240,7 +240,7 @@ impl Work<'_> {
             };
             let earlier = self.earlier.branch(&curve.name);
             let follow = match curve.hold {
-                Kind::Homoclinic | Kind::Heteroclinic => connections::follow,
+                Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic => connections::follow,
                 _ => curves::follow,
             };
             let (branch, going) = match curve.third {
@@ -249,7 +249,8 @@ impl Work<'_> {
             };
             let ended = curves::end_of(self.system, self.plan, curve, &branch);
             self.branches.push(branch);
-            if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
+            let here = self.branches.len() - 1;
+            if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) || !self.curves(here..here + 1) {
                 return false;
             }
         }

@@ -9,11 +9,11 @@ use std::cell::RefCell;
 /// Equilibrium and the derivatives of f there.
 pub struct Local<'a> {
     field: &'a dyn VectorField,
-    state: &'a [f64],
-    parameters: &'a [f64],
+    pub(super) state: &'a [f64],
+    pub(super) parameters: &'a [f64],
     pub(super) n: usize,
     /// `[n × n]`.
-    jacobian: Vec<f64>,
+    pub(super) jacobian: Vec<f64>,
     noise: Option<Noise>,
 }
 
