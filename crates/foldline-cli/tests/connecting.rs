@@ -427,18 +427,90 @@ fn from_takens(state: &str, [free, range]: [&str; 2], [second, second_range]: [&
 /// Numbers of a separate program, as in `reference/connecting.csv`.
 #[test]
 fn loops_start_at_the_bogdanov_takens_point_of_the_normal_form() {
-    let study = from_takens("{ x = 0.3, y = 0 }", ["b1", "[-0.5, 0.5]"], ["b2", "[-0.5, 0.5]"], "0.071727763, 0.144051019");
-    let folder = desk_of(&BOGDANOV_TAKENS.replace("b1 = -0.01", "b1 = -0.09"), &study);
-    let (diagram, _) = run_any(folder.path());
-    let found = marked(&diagram, 0);
-    assert_eq!(found.len(), 2, "{found:?} {:?}", diagram.branch("orbits").unwrap().ends);
-    // Tolerance of the reference 2e-8, and b1 changes half as fast as b2.
-    for ([value, stated], known) in found.iter().zip([-0.04, -0.01]) {
-        assert!((value - known).abs() < stated + 2e-8, "{value} is not {known}");
+    let study =
+        from_takens("{ x = 0.3, y = 0 }", ["b1", "[-0.5, 0.5]"], ["b2", "[-0.5, 0.5]"], "0.071727763, 0.144051019");
+    for study in [study.clone(), study.replace("hold = \"fold\"", "hold = \"hopf\"")] {
+        let folder = desk_of(&BOGDANOV_TAKENS.replace("b1 = -0.01", "b1 = -0.09"), &study);
+        let (diagram, _) = run_any(folder.path());
+        let found = marked(&diagram, 0);
+        assert_eq!(found.len(), 2, "{found:?} {:?}", diagram.branch("orbits").unwrap().ends);
+        // Tolerance of the reference 2e-8, and b1 changes half as fast as b2.
+        for ([value, stated], known) in found.iter().zip([-0.04, -0.01]) {
+            assert!((value - known).abs() < stated + 2e-8, "{value} is not {known}");
+        }
+        let curve = diagram.branch("orbits").unwrap();
+        complete(curve);
+        assert!(matches!(curve.ends[0], Some(Ending::Joined { at: Kind::BogdanovTakens, .. })), "{:?}", curve.ends);
+        let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
     }
+}
+
+#[test]
+fn a_curve_of_loops_ends_at_the_bogdanov_takens_point() {
+    let more = "hold = \"homoclinic\"";
+    let study = from_rest("{ x = 0.1, y = 0 }", ["b2", "[-0.1, 0.3]"], ["b1", "[-0.05, 0.05]"], "-0.04", more);
+    let (diagram, _) = run(desk_of(BOGDANOV_TAKENS, &study).path(), 0);
+    let ends = &diagram.branch("orbits").unwrap().ends;
+    let met = ends.iter().flatten().find_map(|end| match end {
+        Ending::Joined { at: Kind::BogdanovTakens, parameter } => Some(*parameter),
+        _ => None,
+    });
+    assert!(met.is_some_and(|b1| b1.abs() < 1e-10), "{ends:?}");
+}
+
+/// The parameters at which the cycles of a Hopf point end are an independent route to the same orbits.
+#[test]
+fn loops_from_a_bogdanov_takens_point_are_those_in_which_cycles_end() {
+    let study = "model = \"m.toml\"\ntolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nsamples = 16\n\
+                 parameters = { q2 = 0.9, k = 0.6 }\n[[branch]]\nname = \"rest\"\nfrom = \"s\"\nfree = \"q2\"\nrange = [0.5, 2]\n\
+                 switch = { hopf = 1 }\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"rest\"\nfree = \"k\"\n\
+                 range = [0.45, 1.2]\n[[curve]]\nname = \"orbits\"\nhold = \"homoclinic\"\nof = \"folds\"\nnear = 1.41\n\
+                 free = \"k\"\nrange = [0.58, 1.2]\nmark = { k = 0.6 }\n";
+    let (diagram, _) = run_any(desk_of(&model("co-oxidation"), study).path());
+    let cycles = diagram.branch("rest/hopf-1").unwrap();
+    let ends = cycles.ends.iter().flatten();
+    let limit = ends.filter_map(|end| if let Ending::Connecting { parameter, .. } = end { Some(*parameter) } else { None });
+    let limit: Vec<f64> = limit.collect();
+    let free = cycles.free;
     let curve = diagram.branch("orbits").unwrap();
-    complete(curve);
-    assert!(matches!(curve.ends[0], Some(Ending::Joined { at: Kind::BogdanovTakens, .. })), "{:?}", curve.ends);
-    let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
-    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    let mark = curve.special.iter().find(|s| s.kind == Kind::Mark).unwrap();
+    // The last cycle's parameter has converged to the tolerance.
+    let off = (mark.point.parameters[free] - limit[0]).abs();
+    assert!(off < 1e-7, "{} and {limit:?}", mark.point.parameters[free]);
+}
+
+#[test]
+fn a_stopped_curve_of_saddle_nodes_goes_on_to_the_same_ends() {
+    let (model, study) = predator_prey();
+    let study = study.split("[[curve]]\nname = \"upper").next().unwrap().to_string();
+    let folder = desk_of(&model, &study.replace("mark = { k", "max-points = 3\nmark = { k"));
+    let (mut short, _) = run_any(folder.path());
+    let curve = short.branches.iter_mut().find(|branch| branch.name == "saddle-nodes").unwrap();
+    assert_eq!(curve.special.iter().filter(|s| s.kind == Kind::NonCentral).count(), 0);
+    curve.ends = [None, None];
+    let study = parse_study(&study, "study", &model, "model").unwrap();
+    let again = explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, short, &Unobserved);
+    let ends = non_central(&again, "saddle-nodes");
+    assert_eq!(ends.len(), 2, "{:?}", again.branch("saddle-nodes").unwrap().ends);
+    (0..2).for_each(|k| same_non_central(ends[k], NON_CENTRAL[k]));
+}
+
+#[test]
+fn starts_that_do_not_exist_on_a_curve_are_refused_with_the_reason() {
+    // No Bogdanov–Takens point on the curve of folds.
+    let study = from_takens("{ x = 0.3, y = 0 }", ["b1", "[-0.5, 0.5]"], ["b2", "[0.02, 0.5]"], "0.07");
+    let (_, said) = run_any(desk_of(&BOGDANOV_TAKENS.replace("b1 = -0.01", "b1 = -0.09"), &study).path());
+    assert!(said.contains("has no bogdanov-takens point") && said.contains("what to do"), "{said}");
+    // Another plane than that of the curve; a curve of the same kind.
+    let three = BOGDANOV_TAKENS.replace("b2 = 0.05", "b2 = 0.05\nc = 1");
+    for (from, to, words) in [
+        ("of = \"folds\"\nfree = \"b2\"", "of = \"folds\"\nfree = \"c\"", "lies in the plane of b1 and b2"),
+        ("hold = \"homoclinic\"\nof = \"folds\"", "hold = \"hopf\"\nof = \"folds\"", "is a curve, but"),
+    ] {
+        let folder = desk_of(&three, &study.replace(from, to));
+        let output = foldline(folder.path(), &["run", "s.toml", "--out", "run"]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(words), "{}", text(&output));
+    }
 }

@@ -654,6 +654,7 @@ impl Growth<'_> {
         let node = matches!(branch.held, Some((Kind::SaddleNodeHomoclinic, _)));
         // The leading rate at which an orbit was last cut; it is tried again where that has halved.
         let (cut_at, too_long) = (Cell::new(f64::INFINITY), Cell::new(false));
+        let held_here = branch.held;
         let at_axis = |at: &Point| {
             if !connecting {
                 return None;
@@ -662,7 +663,7 @@ impl Growth<'_> {
             too_long.set(long.is_some());
             cut_at.set(long.unwrap_or(cut_at.get()));
             let ends = limit::reached(at, node).or_else(|| {
-                let (_, first) = branch.held.filter(|(kind, _)| *kind == Kind::Homoclinic)?;
+                let (_, first) = held_here.filter(|(kind, _)| *kind == Kind::Homoclinic)?;
                 let free = [first, free].map(|index| (index, system.unit(index)));
                 limit::at_takens(system.field, &system.scales, free, self.settings.tolerance, at)
             });
