@@ -25,7 +25,7 @@ const ROUNDING: f64 = 1e-11;
 /// deviation of the tangent space from the manifold is a hundredth there.
 const CLOSER: f64 = 0.1;
 
-/// The same where the orbit is slow: a quarter of the deviation of second order, which decays on the way besides.
+/// That distance where the orbit is slow: a quarter of the deviation of second order, which decays on the way besides.
 const CLOSER_SLOWLY: f64 = 0.5;
 
 /// Reason why special points are not verified.

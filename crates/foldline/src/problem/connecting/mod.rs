@@ -38,7 +38,7 @@
 //! ```
 //!
 //! On the manifold, z = h₂ y² + h₃ y³ + … with y ~ exp(κ t). The operator (2 κ - D) (3 κ - D) (4 κ - D), D = d/dt, annihilates three
-//! terms. For κ = 0, y' = b y², and z''' is of fifth order. The terms of that order follow from (5 κ - D) applied to (7).
+//! terms. For κ = 0, y' = b y², and z''' is of fifth order. At the other end of a non-central orbit γ vanishes, and (7) serves there as well. The terms of that order follow from (5 κ - D) applied to (7).
 //!
 //! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
 //! in this order: T, x_0, x_1 if it is another equilibrium, ε_0, ε_1, g, e_0, e_1, Q_0, Q_1 (with a row of zeros for a
@@ -68,8 +68,8 @@ use splitting::{flow, gap, identity, metric, product, row_basis, shifted, sign, 
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-/// Ratio of the rate at which the orbit leaves or arrives to that of the other subspace below which (7) replaces the tangent
-/// space. The neglected terms of the flow along the orbit are then smaller by this ratio.
+/// Ratio of the rate at which the orbit leaves or arrives to that of the other subspace, or of the other to the former, below which (7)
+/// replaces the tangent space. The neglected terms of the flow along the orbit are then smaller by this ratio.
 const SLOW: f64 = 0.1;
 /// Coefficients of (7) for the tangent space.
 const TANGENT: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
@@ -737,7 +737,7 @@ impl VectorField for ConnectingField<'_> {
             let rows = ranges[end].len() / n;
             parameters[ranges[end].clone()].copy_from_slice(&row_basis(&split.projector(gone), rows, n));
             let ([other, own], real) = self.rates(end, &self.eigenvalues_of(&split.a));
-            let slow = self.node || real && own < SLOW * other;
+            let slow = self.node || real && (own < SLOW * other || other < SLOW * own);
             let own = if self.node { 0.0 } else { own };
             let first = self.parameter_count() - FURTHER + 4 * end;
             let coefficients = match slow && other.is_finite() {

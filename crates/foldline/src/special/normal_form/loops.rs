@@ -77,7 +77,7 @@ impl Bordered {
         x
     }
 
-    /// The same of the transposed matrix.
+    /// The solution with the transposed matrix, column and row exchanged.
     fn solved_transposed(&self, r: &[f64], last: f64) -> Vec<f64> {
         let mut x = [r, &[last]].concat();
         lu::solve_transposed(&self.factors, self.n + 1, &self.pivots, &mut x);
