@@ -718,6 +718,11 @@ impl Growth<'_> {
                     {
                         return Verdict::Continue;
                     }
+                    if special.kind == Kind::NonCentral {
+                        // Its position depends on where the orbit is cut. The terms that its test function neglects are below the tolerance.
+                        let cut = special.point.trust.discretisation;
+                        special.error += self.settings.tolerance + if cut.is_finite() { cut } else { 0.0 };
+                    }
                     let plain = special.clone();
                     if special.kind == Kind::ImpactGrazing && branch.held.is_some() {
                         special.remark = "the sequence of events of this curve ends".into();
