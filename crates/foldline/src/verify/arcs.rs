@@ -129,7 +129,8 @@ impl Recomputed<'_> {
             all.push([value.abs() / own, worst[1]]);
         }
         if let Some(orbit) = orbit {
-            for end in 0..2 {
+            // Where the orbit is free to arrive, no manifold is approximated.
+            for end in (0..2).filter(|end| orbit.is_bound(*end)) {
                 all.push([self.off_manifold(orbit, &integrator, end)?, stated]);
             }
         }
