@@ -188,6 +188,13 @@ impl Monitor for OnConnection<'_> {
         }
         let Some((own, value)) = self.own(at).zip(self.tested(at)) else { return false };
         let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+        // The vanishing eigenvalue may be the only one of its side.
+        let size = match self.kind {
+            Kind::NonCentral | Kind::ShilnikovHopf => {
+                self.field.saddles(&at.parameters).iter().flatten().flatten().fold(size, |m, z| m.max(z.norm()))
+            }
+            _ => size,
+        };
         value.abs() < NEAR * size * if self.kind == Kind::DoubleEigenvalue { size } else { 1.0 }
     }
 
