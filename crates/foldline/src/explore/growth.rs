@@ -9,7 +9,7 @@ use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Condition, Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{
-    Branch, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
+    Branch, Connection, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
 };
 use crate::problem::gauss::Points;
 use crate::problem::impact::{ImpactProblem, stored::impacts};
@@ -878,6 +878,14 @@ impl Growth<'_> {
             }
             Ending::GivenUp(why) if branch.is_connecting() => {
                 Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why, node))
+            }
+            Ending::PeriodUnbounded(period) if free_cycles => {
+                // The saddle-node is solved for, so that the last cycle need not have its parameter to the tolerance: the law of the
+                // period decides, which holds to first order in the distance.
+                const NEAR: f64 = 1e-2;
+                let near = Limits { tolerance: NEAR, ..limits }.approached(&latest.borrow());
+                let node = |end: &Ending| matches!(end, Ending::Connecting { connection: Connection::SaddleNode, .. });
+                near.filter(node).unwrap_or(Ending::PeriodUnbounded(period))
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {
                 Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))
