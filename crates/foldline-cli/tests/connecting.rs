@@ -470,7 +470,8 @@ fn loops_from_a_bogdanov_takens_point_are_those_in_which_cycles_end() {
     let (diagram, _) = run_any(desk_of(&model("co-oxidation"), study).path());
     let cycles = diagram.branch("rest/hopf-1").unwrap();
     let ends = cycles.ends.iter().flatten();
-    let limit = ends.filter_map(|end| if let Ending::Connecting { parameter, .. } = end { Some(*parameter) } else { None });
+    let limit =
+        ends.filter_map(|end| if let Ending::Connecting { parameter, .. } = end { Some(*parameter) } else { None });
     let limit: Vec<f64> = limit.collect();
     let free = cycles.free;
     let curve = diagram.branch("orbits").unwrap();

@@ -113,7 +113,8 @@ pub fn points(
         row.push(Cell::Spectrum(if hidden { Vec::new() } else { point.spectrum.clone() }));
         if connecting {
             // A saddle-node has none.
-            let saddle = branch.is_connecting() && !matches!(branch.held, Some((foldline::diagram::Kind::SaddleNodeHomoclinic, _)));
+            let saddle = branch.is_connecting()
+                && !matches!(branch.held, Some((foldline::diagram::Kind::SaddleNodeHomoclinic, _)));
             let sigma = if saddle { on_connections::quantity_of(&point.spectrum) } else { None };
             row.push(sigma.map_or(Cell::Empty, Cell::Number));
         }

@@ -294,10 +294,7 @@ fn beside_non_central<'s>(
         let smallest = values.iter().min_by(|a, b| a.re.abs().total_cmp(&b.re.abs())).ok_or_else(lost)?;
         ConnectingField::at_saddle_node(system.field, &system.scales, positive - usize::from(smallest.re > 0.0))
     };
-    let mut parameters = at.parameters.clone();
-    if let Some(count) = parameters.last_mut() {
-        *count = field.unstable_off_axis() as f64;
-    }
+    let parameters = field.renewed(&at.parameters);
     let start = Start { field, point: bare(&parameters, Solution::Cycle(orbit.clone())), away_from: None };
     let start = settled(system, plan, curve, first, start)?;
     // Off the point where they meet, to the side on which the orbits exist.
@@ -327,9 +324,8 @@ fn beside_non_central<'s>(
         })
     };
     drop(own);
-    let point = found.ok_or_else(|| {
-        format!("no {} orbit is found next to the non-central one of {}", curve.hold, parent.name)
-    })?;
+    let point = found
+        .ok_or_else(|| format!("no {} orbit is found next to the non-central one of {}", curve.hold, parent.name))?;
     Ok(Start { point: bare(&point.parameters, point.solution), ..start })
 }
 
@@ -356,7 +352,8 @@ fn beside_takens<'s>(
         )
     };
     let local = Local::new(system.field, at).ok_or_else(degenerate)?;
-    let loops = Loops::new(&local, &system.scales, free, free.map(|index| system.unit(index))).ok_or_else(degenerate)?;
+    let loops =
+        Loops::new(&local, &system.scales, free, free.map(|index| system.unit(index))).ok_or_else(degenerate)?;
     let mut last = None;
     for size in SIZES {
         let eps = loops.of_size(size);
@@ -428,7 +425,8 @@ fn on_loop<'s>(
         node: false,
         gain: &[],
     };
-    let start = pieced(system, plan, &orbit)?.ok_or("the orbit of the normal form does not come close to the saddle")?;
+    let start =
+        pieced(system, plan, &orbit)?.ok_or("the orbit of the normal form does not come close to the saddle")?;
     settled(system, plan, curve, first, start)
 }
 
@@ -611,7 +609,15 @@ fn cut<'s>(
         ));
     }
     let gain: &[f64] = if between_two { &[] } else { &cycle.gain };
-    let orbit = Orbit { parameters: &point.parameters, cycle, times: [begin, until], places: &places, count, node: false, gain };
+    let orbit = Orbit {
+        parameters: &point.parameters,
+        cycle,
+        times: [begin, until],
+        places: &places,
+        count,
+        node: false,
+        gain,
+    };
     let start = pieced(system, plan, &orbit)?.ok_or_else(|| {
         "the last cycle does not come close enough to the equilibrium\nlikely cause: its period is not long yet\nwhat to \
          do: follow the branch of cycles further, with more `max-points`"
@@ -814,7 +820,8 @@ pub(super) fn shortened(growth: &Growth, system: &System, line: &Line, at: &Poin
     problem.factorise(&u, &parameter_row(u.len())).ok()?;
     let share = (MARGIN * growth.settings.tolerance / problem.truncation(&u)).sqrt().min(MOST);
     drop(problem);
-    let shares = [share, share.sqrt(), share.powf(0.25)].into_iter().filter(|share| *share > WORTH);
+    // The tangent space may have served so far, with a much larger error.
+    let shares = [share, MOST.sqrt(), MOST.sqrt().sqrt(), MOST.powf(0.125)].into_iter().filter(|share| *share > WORTH);
     shares.into_iter().find_map(|share| resized(growth, system, line, at, share))
 }
 

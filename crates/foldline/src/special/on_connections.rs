@@ -37,7 +37,8 @@ pub struct OnConnection<'a> {
 /// Monitors for a curve of connecting orbits.
 pub fn monitors<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
     let both = [Kind::DoubleEigenvalue, Kind::ThreeLeading, Kind::NonCentral, Kind::ShilnikovHopf];
-    let own = |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side, node: false }) as Box<dyn Monitor + 'a>;
+    let own =
+        |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side, node: false }) as Box<dyn Monitor + 'a>;
     let sides = both.into_iter().flat_map(|kind| [own(kind, 1.0), own(kind, -1.0)]);
     let flips = [Kind::OrbitFlip, Kind::InclinationFlip].into_iter();
     let flips = flips.flat_map(|kind| [own(kind, -1.0), own(kind, 1.0)]);
@@ -46,7 +47,8 @@ pub fn monitors<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
 
 /// Monitors for a curve of orbits homoclinic to saddle-nodes.
 pub fn monitors_at_saddle_nodes<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
-    let own = |side: f64| Box::new(OnConnection { field, kind: Kind::NonCentral, side, node: true }) as Box<dyn Monitor + 'a>;
+    let own =
+        |side: f64| Box::new(OnConnection { field, kind: Kind::NonCentral, side, node: true }) as Box<dyn Monitor + 'a>;
     vec![own(-1.0), own(1.0)]
 }
 

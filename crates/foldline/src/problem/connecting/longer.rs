@@ -104,7 +104,8 @@ fn shorter(field: &ConnectingField, cycle: &Cycle, parameters: &[f64], shares: [
         let side = if end == 0 { 1.0 } else { -1.0 };
         splits[end].length(&field.deviations([x, x], parameters)[end], side)
     };
-    let states: Vec<Vec<f64>> = cycle.mesh.iter().map(|t| if *t < 1.0 { cycle.state(*t) } else { cycle.end() }).collect();
+    let states: Vec<Vec<f64>> =
+        cycle.mesh.iter().map(|t| if *t < 1.0 { cycle.state(*t) } else { cycle.end() }).collect();
     let goal = |end: usize| {
         let far = states.iter().map(|x| size(end, x)).fold(0.0, f64::max);
         if shares[end] > 1.0 { (shares[end] * field.sizes(parameters)[end]).min(FAR * far) } else { 0.0 }
@@ -136,7 +137,7 @@ pub(super) fn resized(
 ) -> Option<(Cycle, Vec<f64>)> {
     // Without conditions at an end, its distance causes no error. Elsewhere it is of second order, or of fifth where (7) holds.
     let rows = field.row_ranges();
-    let shares = [0, 1].map(|end| match field.is_slow(end, parameters) {
+    let shares = [0, 1].map(|end| match field.will_be_slow(end, parameters) {
         _ if rows[end].is_empty() => 1.0,
         true => share.powf(0.4),
         false => share.min(1.0),

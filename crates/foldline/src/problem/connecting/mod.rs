@@ -233,6 +233,14 @@ impl<'a> ConnectingField<'a> {
         Some(ConnectingField { unstable, node: kind == Kind::SaddleNodeHomoclinic, ..own })
     }
 
+    /// Parameters of an orbit of another kind, to which no reference applies yet.
+    pub fn renewed(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut all = parameters[..parameters.len().saturating_sub(FURTHER)].to_vec();
+        all.resize(self.parameter_count() - 1, 0.0);
+        all.push(self.unstable as f64);
+        all
+    }
+
     /// Stored parameters, with what files of earlier versions lack.
     pub fn completed(&self, parameters: &[f64]) -> Vec<f64> {
         let mut all = parameters.to_vec();
@@ -264,14 +272,22 @@ impl<'a> ConnectingField<'a> {
     pub fn parameters(&self, own: &[f64], length: f64, places: &[f64], sizes: [f64; 2], gain: &[f64]) -> Vec<f64> {
         let mut all = [&own[..self.known()], &[length], places, &sizes].concat();
         all.extend((0..self.dim()).map(|c| gain.get(c).copied().unwrap_or(0.0)));
-        all.resize(self.parameter_count() - FURTHER, 0.0);
-        self.completed(&all)
+        all.resize(self.parameter_count() - 1, 0.0);
+        all.push(self.unstable as f64);
+        all
     }
 
     /// Coefficients of (7) at an end.
     fn coefficients(&self, end: usize, parameters: &[f64]) -> [f64; 4] {
         let first = self.parameter_count() - FURTHER + 4 * end;
         std::array::from_fn(|k| parameters.get(first + k).copied().unwrap_or(TANGENT[k]))
+    }
+
+    /// True where (7) will replace the tangent space once an end is placed again.
+    fn will_be_slow(&self, end: usize, parameters: &[f64]) -> bool {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let ([other, own], real) = self.rates(end, &self.eigenvalues_of(&at.a));
+        self.node || real && is_slow(own, other)
     }
 
     /// True where (7) replaces the tangent space at an end.
@@ -431,6 +447,12 @@ impl<'a> ConnectingField<'a> {
         };
         (Batch { parameters, times: &[], ..at }, lengths)
     }
+}
+
+/// True if (7) is to replace the tangent space, by the distances from the axis of the leading eigenvalue of the subspace in which the
+/// orbit leaves or arrives, which is real, and of the other one.
+fn is_slow(own: f64, other: f64) -> bool {
+    own < SLOW * other || other < SLOW * own
 }
 
 /// Time derivatives of the flow at a state.
@@ -676,27 +698,28 @@ impl VectorField for ConnectingField<'_> {
             };
             let varied: Vec<Vec<f64>> = along.iter().map(turned_by).collect();
             let own_value = |values: &[f64]| dot(values, &subject);
-            let mut put = |values: &[f64], factor: f64, there: Option<&[Vec<Vec<f64>>; 2]>, value: f64, varied: &[f64]| {
-                let ends = if end == 0 { &mut *left } else { &mut *right };
-                b[row] = value;
-                for j in 0..n {
-                    ends[row * n + j] = factor * values[j] / self.scales[j];
-                }
-                for (c, index) in free.iter().enumerate() {
-                    if place.contains(index) {
-                        let j = index - place.start;
-                        by[row * q + c] = -factor * values[j] / self.scales[j];
+            let mut put =
+                |values: &[f64], factor: f64, there: Option<&[Vec<Vec<f64>>; 2]>, value: f64, varied: &[f64]| {
+                    let ends = if end == 0 { &mut *left } else { &mut *right };
+                    b[row] = value;
+                    for j in 0..n {
+                        ends[row * n + j] = factor * values[j] / self.scales[j];
                     }
-                }
-                if let Some([in_states, in_parameters]) = there {
-                    in_states.iter().enumerate().for_each(|(j, slope)| ends[row * n + j] += dot(values, slope));
-                    for (c, own) in (0..q).filter_map(|c| Some((c, column(c)?))) {
-                        by[row * q + c] += dot(values, &in_parameters[own]);
+                    for (c, index) in free.iter().enumerate() {
+                        if place.contains(index) {
+                            let j = index - place.start;
+                            by[row * q + c] = -factor * values[j] / self.scales[j];
+                        }
                     }
-                }
-                moves.iter().zip(varied).for_each(|(c, v)| by[row * q + c] += v);
-                row += 1;
-            };
+                    if let Some([in_states, in_parameters]) = there {
+                        in_states.iter().enumerate().for_each(|(j, slope)| ends[row * n + j] += dot(values, slope));
+                        for (c, own) in (0..q).filter_map(|c| Some((c, column(c)?))) {
+                            by[row * q + c] += dot(values, &in_parameters[own]);
+                        }
+                    }
+                    moves.iter().zip(varied).for_each(|(c, v)| by[row * q + c] += v);
+                    row += 1;
+                };
             for (r, values) in own.chunks_exact(n).enumerate() {
                 let varied: Vec<f64> = varied.iter().map(|v| v[r]).collect();
                 put(values, linear, further.as_ref(), own_value(values), &varied);
@@ -737,7 +760,9 @@ impl VectorField for ConnectingField<'_> {
             let rows = ranges[end].len() / n;
             parameters[ranges[end].clone()].copy_from_slice(&row_basis(&split.projector(gone), rows, n));
             let ([other, own], real) = self.rates(end, &self.eigenvalues_of(&split.a));
-            let slow = self.node || real && (own < SLOW * other || other < SLOW * own);
+            // Between references the conditions remain of one kind: the ends were placed for it.
+            let known = self.coefficients(end, parameters);
+            let slow = self.node || real && if known == [0.0; 4] { is_slow(own, other) } else { known[3] != 0.0 };
             let own = if self.node { 0.0 } else { own };
             let first = self.parameter_count() - FURTHER + 4 * end;
             let coefficients = match slow && other.is_finite() {
@@ -778,7 +803,11 @@ impl VectorField for ConnectingField<'_> {
                 let [d1, d2, d3, d4] = self.motions(ends[end], parameters);
                 let all = [y, &d1, &d2, &d3, &d4];
                 let one = |c: usize| -> f64 {
-                    coefficients.iter().enumerate().map(|(k, own)| own * (5.0 * kappa * all[k][c] - all[k + 1][c])).sum()
+                    coefficients
+                        .iter()
+                        .enumerate()
+                        .map(|(k, own)| own * (5.0 * kappa * all[k][c] - all[k + 1][c]))
+                        .sum()
                 };
                 ((0..n).map(one).collect(), other + 5.0 * kept)
             };
