@@ -25,8 +25,9 @@ const ROUNDING: f64 = 1e-11;
 /// deviation of the tangent space from the manifold is a hundredth there.
 const CLOSER: f64 = 0.1;
 
-/// That distance where the orbit is slow: a quarter of the deviation of second order, which decays on the way besides.
-const CLOSER_SLOWLY: f64 = 0.5;
+/// That distance where the orbit must not drift along a direction in which the flow is slow: no deviation decays on the way, and the
+/// orbit approaches fast.
+const MUCH_CLOSER: f64 = 1e-4;
 
 /// Reason why special points are not verified.
 const SPECIAL: &str = "special points of boundary-value problems and connecting orbits are not located again";
@@ -162,9 +163,12 @@ impl Recomputed<'_> {
         let split = orbit.parts(end, parameters).ok_or("the equilibrium of the orbit is too close to a bifurcation")?;
         let side = if end == 0 { 1.0 } else { -1.0 };
         // Next to a bifurcation the linear flow leads nowhere.
-        let (time, closer) = match orbit.is_slow(end, parameters) {
-            true => orbit.approached(end, y, parameters, CLOSER_SLOWLY),
-            false => split.time_to(y, side, CLOSER).map(|time| (time, split.flow(y, side, -side * time))),
+        let (time, closer) = match (orbit.is_slow(end, parameters), orbit.creeps(end, parameters)) {
+            (true, true) => orbit.approached(end, y, parameters, CLOSER),
+            (slow, _) => {
+                let share = if slow { MUCH_CLOSER } else { CLOSER };
+                split.time_to(y, side, share).map(|time| (time, split.flow(y, side, -side * time)))
+            }
         }
         .ok_or("the orbit does not approach the equilibrium")?;
         let start: Vec<f64> = ends[end]

@@ -283,6 +283,13 @@ impl<'a> ConnectingField<'a> {
         std::array::from_fn(|k| parameters.get(first + k).copied().unwrap_or(TANGENT[k]))
     }
 
+    /// True if the orbit leaves or arrives at an end more slowly than deviations decay there.
+    pub fn creeps(&self, end: usize, parameters: &[f64]) -> bool {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let ([other, own], _) = self.rates(end, &self.eigenvalues_of(&at.a));
+        self.node || own < other
+    }
+
     /// True where (7) will replace the tangent space once an end is placed again.
     fn will_be_slow(&self, end: usize, parameters: &[f64]) -> bool {
         let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
