@@ -374,7 +374,7 @@ const JUNCTION: &str = "[parameters]\ncurrent = 1.2\nbeta = 1.5\n[states]\nphi =
 #[test]
 fn the_junction_has_orbits_homoclinic_to_a_saddle_node_only_with_strong_damping() {
     let study = "model = \"m.toml\"\ntolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"running\"\n\
-                 from = \"s\"\nfree = \"current\"\nrange = [0.2, 1.5]\n[[curve]]\nname = \"nodes\"\nhold = \"saddle-node-homoclinic\"\n\
+                 from = \"s\"\nfree = \"current\"\nrange = [0.01, 1.5]\n[[curve]]\nname = \"nodes\"\nhold = \"saddle-node-homoclinic\"\n\
                  of = \"running\"\nfree = \"beta\"\nrange = [0.5, 3]\nmark = { beta = 2 }\n[[curve]]\nname = \"saddles\"\n\
                  hold = \"homoclinic\"\nof = \"nodes\"\nfree = \"beta\"\nrange = [0.02, 3]\nmark = { beta = [0.02, 0.05] }\n";
     let folder = desk_of(JUNCTION, study);

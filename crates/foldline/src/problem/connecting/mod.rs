@@ -69,8 +69,8 @@ use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 /// Ratio of the rate at which the orbit leaves or arrives to that of the other subspace, or of the other to the former, below which (7)
-/// replaces the tangent space. The neglected terms of the flow along the orbit are then smaller by this ratio.
-const SLOW: f64 = 0.1;
+/// replaces the tangent space. Elsewhere the tangent space serves at ends that are as close as test functions of flips need them.
+const SLOW: f64 = 0.01;
 /// Coefficients of (7) for the tangent space.
 const TANGENT: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
 /// Further parameters of the reference behind Q: the coefficients of (7), and the number of unstable eigenvalues.

@@ -14,7 +14,7 @@ use num_complex::Complex64;
 const REACHED: f64 = 1e-3;
 
 /// Ratio of the smallest to the largest distance from the axis below which an orbit may be longer than it need be …
-const SLOW: f64 = 0.1;
+const SLOW: f64 = 0.01;
 /// … and its length in units of the time constant of that eigenvalue from which on it probably is. At a distance at which
 /// terms of second order matter, the constant does not determine the length.
 const LONG: f64 = 4.0;
