@@ -302,3 +302,216 @@ fn the_loop_of_the_bogdanov_takens_normal_form_starts_from_its_saddle() {
         assert!((value - known).abs() < stated + 2e-8, "{value} is not {known}");
     }
 }
+
+/// Predator and prey with a refuge, `studies/auto/models/mtn.toml`. Its curve of orbits homoclinic to saddle-nodes in (gf, k) ends in two
+/// non-central ones.
+fn predator_prey() -> (String, String) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/auto");
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    (read("models/mtn.toml"), read("mtn.toml").replace("models/mtn.toml", "m.toml"))
+}
+
+/// Values k and gf of the non-central orbits: a trajectory on the centre manifold, from a distance of 1e-4 with terms of second
+/// order, meets one on the strong stable manifold, from a distance of 1e-5, followed backwards (SciPy, DOP853 with rtol = 1e-13). Other
+/// distances (3e-4, 3e-5) and sections change none of these digits.
+const NON_CENTRAL: [[f64; 2]; 2] = [[5.1803076028, 0.063854986488], [6.6104586494, 0.069324818334]];
+
+#[track_caller]
+fn non_central(diagram: &Diagram, branch: &str) -> Vec<[f64; 3]> {
+    let own = diagram.branch(branch).unwrap().special.iter().filter(|s| s.kind == Kind::NonCentral);
+    let mut all: Vec<[f64; 3]> = own.map(|s| [s.point.parameters[0], s.point.parameters[1], s.error]).collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    all
+}
+
+#[track_caller]
+fn same_non_central(found: [f64; 3], known: [f64; 2]) {
+    let off = (0..2).map(|k| (found[k] - known[k]).abs() / (1.0 + known[k])).fold(0.0, f64::max);
+    // 1e-10: digits of the reference.
+    assert!(off < found[2] + 1e-10, "{found:?} is not {known:?}: off by {off:e}");
+    assert!(off < 1e-7, "{found:?} is not {known:?}: off by {off:e}");
+}
+
+#[test]
+fn orbits_homoclinic_to_saddle_nodes_end_at_non_central_ones_from_which_those_of_saddles_start() {
+    let (model, study) = predator_prey();
+    let folder = desk_of(&model, &study);
+    let (diagram, _) = run_any(folder.path());
+    let curve = diagram.branch("saddle-nodes").unwrap();
+    complete(curve);
+    let ends = non_central(&diagram, "saddle-nodes");
+    assert_eq!(ends.len(), 2, "{:?}", curve.ends);
+    (0..2).for_each(|k| same_non_central(ends[k], NON_CENTRAL[k]));
+    // Both parameters lie on the fold of the equilibria: an eigenvalue is 0, with the determinant of the closed Jacobian.
+    for point in &curve.points {
+        let least = point.spectrum.iter().map(|z| z.re.abs()).fold(f64::INFINITY, f64::min);
+        assert!(least < 1e-9, "{least:e}");
+    }
+    for (name, known) in [("lower saddles", NON_CENTRAL[0]), ("upper saddles", NON_CENTRAL[1])] {
+        let curve = diagram.branch(name).unwrap();
+        let ends = non_central(&diagram, name);
+        assert_eq!(ends.len(), 1, "{name}: {:?}", curve.ends);
+        same_non_central(ends[0], known);
+    }
+    let output = foldline(folder.path(), &["verify", "run"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+#[test]
+fn a_curve_of_orbits_homoclinic_to_saddle_nodes_starts_where_one_of_saddles_ends() {
+    let (model, study) = predator_prey();
+    let more = "\n[[curve]]\nname = \"back\"\nhold = \"saddle-node-homoclinic\"\nof = \"upper saddles\"\nfree = \"k\"\nrange = [4, 8]\n";
+    let (diagram, _) = run_any(desk_of(&model, &format!("{study}{more}")).path());
+    let ends = non_central(&diagram, "back");
+    assert_eq!(ends.len(), 2, "{:?}", diagram.branch("back").unwrap().ends);
+    (0..2).for_each(|k| same_non_central(ends[k], NON_CENTRAL[k]));
+}
+
+/// Josephson junction, φ'' + β φ' + sin φ = I: the saddle-node is φ = π/2 at I = 1 for all β.
+const JUNCTION: &str = "[parameters]\ncurrent = 1.2\nbeta = 1.5\n[states]\nphi = { equation = \"v\", period = \"2*pi\" }\n\
+                        v = { equation = \"current - sin(phi) - beta*v\", range = [-1, 2] }\n";
+
+#[test]
+fn the_junction_has_orbits_homoclinic_to_a_saddle_node_only_with_strong_damping() {
+    let study = "model = \"m.toml\"\ntolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"running\"\n\
+                 from = \"s\"\nfree = \"current\"\nrange = [0.01, 1.5]\n[[curve]]\nname = \"nodes\"\nhold = \"saddle-node-homoclinic\"\n\
+                 of = \"running\"\nfree = \"beta\"\nrange = [0.5, 3]\nmark = { beta = 2 }\n[[curve]]\nname = \"saddles\"\n\
+                 hold = \"homoclinic\"\nof = \"nodes\"\nfree = \"beta\"\nrange = [0.02, 3]\nmark = { beta = [0.02, 0.05] }\n";
+    let folder = desk_of(JUNCTION, study);
+    let (diagram, _) = run_any(folder.path());
+    let nodes = diagram.branch("nodes").unwrap();
+    complete(nodes);
+    for point in &nodes.points {
+        assert!((point.parameters[0] - 1.0).abs() < 1e-10, "I = {}", point.parameters[0]);
+    }
+    let end = non_central(&diagram, "nodes");
+    assert_eq!(end.len(), 1, "{:?}", nodes.ends);
+    let again = non_central(&diagram, "saddles");
+    assert_eq!(again.len(), 1);
+    let off = (end[0][1] - again[0][1]).abs();
+    assert!(off < 1e-8, "β = {} and {}", end[0][1], again[0][1]);
+    // For β -> 0 the energy lost on the separatrix of the pendulum, 8 β, is what the current supplies, 2π I. The next term is of
+    // second order.
+    let saddles = diagram.branch("saddles").unwrap();
+    let marks = saddles.special.iter().filter(|s| s.kind == Kind::Mark);
+    let mut count = 0;
+    for mark in marks {
+        let (current, beta) = (mark.point.parameters[0], mark.point.parameters[1]);
+        let first = 4.0 * beta / std::f64::consts::PI;
+        assert!((current - first).abs() < 0.1 * beta * beta, "I({beta}) = {current}, {first}");
+        count += 1;
+    }
+    assert_eq!(count, 2, "{:?}", saddles.ends);
+    let output = foldline(folder.path(), &["verify", "run"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+}
+
+/// Runs a study, whose branches may be incomplete.
+#[track_caller]
+fn run_any(folder: &Path) -> (Diagram, String) {
+    let output = foldline(folder, &["run", "s.toml", "--out", "run"]);
+    assert!(matches!(output.status.code(), Some(0 | 3)), "{}", text(&output));
+    (load_part(&folder.join("run"), Part::Everything).unwrap().diagram, text(&output))
+}
+
+/// A branch of equilibria, its folds, and homoclinic orbits from their Bogdanov–Takens point.
+fn from_takens(state: &str, [free, range]: [&str; 2], [second, second_range]: [&str; 2], marks: &str) -> String {
+    format!(
+        "model = \"m.toml\"\ntolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = {state}\n[[branch]]\nname = \"rest\"\n\
+         from = \"s\"\nfree = \"{free}\"\nrange = {range}\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"rest\"\n\
+         free = \"{second}\"\nrange = {second_range}\n[[curve]]\nname = \"orbits\"\nhold = \"homoclinic\"\nof = \"folds\"\n\
+         free = \"{second}\"\nrange = {second_range}\nmark = {{ {second} = [{marks}] }}\n"
+    )
+}
+
+/// Numbers of a separate program, as in `reference/connecting.csv`.
+#[test]
+fn loops_start_at_the_bogdanov_takens_point_of_the_normal_form() {
+    let study =
+        from_takens("{ x = 0.3, y = 0 }", ["b1", "[-0.5, 0.5]"], ["b2", "[-0.5, 0.5]"], "0.071727763, 0.144051019");
+    for study in [study.clone(), study.replace("hold = \"fold\"", "hold = \"hopf\"")] {
+        let folder = desk_of(&BOGDANOV_TAKENS.replace("b1 = -0.01", "b1 = -0.09"), &study);
+        let (diagram, _) = run_any(folder.path());
+        let found = marked(&diagram, 0);
+        assert_eq!(found.len(), 2, "{found:?} {:?}", diagram.branch("orbits").unwrap().ends);
+        // Tolerance of the reference 2e-8, and b1 changes half as fast as b2.
+        for ([value, stated], known) in found.iter().zip([-0.04, -0.01]) {
+            assert!((value - known).abs() < stated + 2e-8, "{value} is not {known}");
+        }
+        let curve = diagram.branch("orbits").unwrap();
+        complete(curve);
+        assert!(matches!(curve.ends[0], Some(Ending::Joined { at: Kind::BogdanovTakens, .. })), "{:?}", curve.ends);
+        let output = foldline(folder.path(), &["verify", "run", "--branch", "orbits"]);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output));
+    }
+}
+
+#[test]
+fn a_curve_of_loops_ends_at_the_bogdanov_takens_point() {
+    let more = "hold = \"homoclinic\"";
+    let study = from_rest("{ x = 0.1, y = 0 }", ["b2", "[-0.1, 0.3]"], ["b1", "[-0.05, 0.05]"], "-0.04", more);
+    let (diagram, _) = run(desk_of(BOGDANOV_TAKENS, &study).path(), 0);
+    let ends = &diagram.branch("orbits").unwrap().ends;
+    let met = ends.iter().flatten().find_map(|end| match end {
+        Ending::Joined { at: Kind::BogdanovTakens, parameter } => Some(*parameter),
+        _ => None,
+    });
+    assert!(met.is_some_and(|b1| b1.abs() < 1e-10), "{ends:?}");
+}
+
+/// The parameters at which the cycles of a Hopf point end are an independent route to the same orbits.
+#[test]
+fn loops_from_a_bogdanov_takens_point_are_those_in_which_cycles_end() {
+    let study = "model = \"m.toml\"\ntolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nsamples = 16\n\
+                 parameters = { q2 = 0.9, k = 0.6 }\n[[branch]]\nname = \"rest\"\nfrom = \"s\"\nfree = \"q2\"\nrange = [0.5, 2]\n\
+                 switch = { hopf = 1 }\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"rest\"\nfree = \"k\"\n\
+                 range = [0.45, 1.2]\n[[curve]]\nname = \"orbits\"\nhold = \"homoclinic\"\nof = \"folds\"\nnear = 1.41\n\
+                 free = \"k\"\nrange = [0.58, 1.2]\nmark = { k = 0.6 }\n";
+    let (diagram, _) = run_any(desk_of(&model("co-oxidation"), study).path());
+    let cycles = diagram.branch("rest/hopf-1").unwrap();
+    let ends = cycles.ends.iter().flatten();
+    let limit =
+        ends.filter_map(|end| if let Ending::Connecting { parameter, .. } = end { Some(*parameter) } else { None });
+    let limit: Vec<f64> = limit.collect();
+    let free = cycles.free;
+    let curve = diagram.branch("orbits").unwrap();
+    let mark = curve.special.iter().find(|s| s.kind == Kind::Mark).unwrap();
+    // The last cycle's parameter has converged to the tolerance.
+    let off = (mark.point.parameters[free] - limit[0]).abs();
+    assert!(off < 1e-7, "{} and {limit:?}", mark.point.parameters[free]);
+}
+
+#[test]
+fn a_stopped_curve_of_saddle_nodes_goes_on_to_the_same_ends() {
+    let (model, study) = predator_prey();
+    let study = study.split("[[curve]]\nname = \"upper").next().unwrap().to_string();
+    let folder = desk_of(&model, &study.replace("mark = { k", "max-points = 3\nmark = { k"));
+    let (mut short, _) = run_any(folder.path());
+    let curve = short.branches.iter_mut().find(|branch| branch.name == "saddle-nodes").unwrap();
+    assert_eq!(curve.special.iter().filter(|s| s.kind == Kind::NonCentral).count(), 0);
+    curve.ends = [None, None];
+    let study = parse_study(&study, "study", &model, "model").unwrap();
+    let again = explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, short, &Unobserved);
+    let ends = non_central(&again, "saddle-nodes");
+    assert_eq!(ends.len(), 2, "{:?}", again.branch("saddle-nodes").unwrap().ends);
+    (0..2).for_each(|k| same_non_central(ends[k], NON_CENTRAL[k]));
+}
+
+#[test]
+fn starts_that_do_not_exist_on_a_curve_are_refused_with_the_reason() {
+    // No Bogdanov–Takens point on the curve of folds.
+    let study = from_takens("{ x = 0.3, y = 0 }", ["b1", "[-0.5, 0.5]"], ["b2", "[0.02, 0.5]"], "0.07");
+    let (_, said) = run_any(desk_of(&BOGDANOV_TAKENS.replace("b1 = -0.01", "b1 = -0.09"), &study).path());
+    assert!(said.contains("has no bogdanov-takens point") && said.contains("what to do"), "{said}");
+    // Another plane than that of the curve; a curve of the same kind.
+    let three = BOGDANOV_TAKENS.replace("b2 = 0.05", "b2 = 0.05\nc = 1");
+    for (from, to, words) in [
+        ("of = \"folds\"\nfree = \"b2\"", "of = \"folds\"\nfree = \"c\"", "lies in the plane of b1 and b2"),
+        ("hold = \"homoclinic\"\nof = \"folds\"", "hold = \"hopf\"\nof = \"folds\"", "is a curve, but"),
+    ] {
+        let folder = desk_of(&three, &study.replace(from, to));
+        let output = foldline(folder.path(), &["run", "s.toml", "--out", "run"]);
+        assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+        assert!(text(&output).contains(words), "{}", text(&output));
+    }
+}

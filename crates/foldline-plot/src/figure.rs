@@ -287,7 +287,7 @@ impl Marker {
             Kind::ImpactGrazing => Marker::Diamond,
             Kind::Peak => Marker::Nabla,
             Kind::Mark => Marker::Dot,
-            Kind::Homoclinic | Kind::Heteroclinic => Marker::Dot,
+            Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic => Marker::Dot,
             Kind::NeutralSaddle => Marker::Circle,
             Kind::DoubleEigenvalue | Kind::ThreeLeading => Marker::Triangle,
             Kind::OrbitFlip | Kind::InclinationFlip => Marker::Cross,

@@ -245,7 +245,7 @@ pub trait VectorField: Send + Sync {
     }
 
     /// An orbit that connects equilibria, and its parameters, continued approximately until its ends are closer to them by
-    /// the factor `share`.
+    /// the factor `share`; with a factor greater than 1, cut where it is farther from them.
     fn lengthened(&self, _orbit: &Cycle, _parameters: &[f64], _share: f64) -> Option<(Cycle, Vec<f64>)> {
         None
     }

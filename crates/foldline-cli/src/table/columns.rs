@@ -112,7 +112,10 @@ pub fn points(
         let hidden = branch.family == Family::Arc && !branch.is_connecting();
         row.push(Cell::Spectrum(if hidden { Vec::new() } else { point.spectrum.clone() }));
         if connecting {
-            let sigma = if branch.is_connecting() { on_connections::quantity_of(&point.spectrum) } else { None };
+            // A saddle-node has none.
+            let saddle = branch.is_connecting()
+                && !matches!(branch.held, Some((foldline::diagram::Kind::SaddleNodeHomoclinic, _)));
+            let sigma = if saddle { on_connections::quantity_of(&point.spectrum) } else { None };
             row.push(sigma.map_or(Cell::Empty, Cell::Number));
         }
         match contacts.cells.get(&(branch.name.clone(), point.position)) {

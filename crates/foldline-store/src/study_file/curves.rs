@@ -27,7 +27,7 @@ pub(super) const KEYS: [&str; 14] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 10] = [
+const HELD: [Kind; 11] = [
     Kind::Fold,
     Kind::BranchPoint,
     Kind::Hopf,
@@ -38,6 +38,7 @@ const HELD: [Kind; 10] = [
     Kind::BoundaryEquilibrium,
     Kind::Homoclinic,
     Kind::Heteroclinic,
+    Kind::SaddleNodeHomoclinic,
 ];
 
 /// Branch or curve on which the special point lies.
@@ -52,6 +53,8 @@ pub(super) struct Base {
     pub(super) beginning: Vec<Option<f64>>,
     /// Equilibria or cycles, if known.
     pub(super) family: Option<Family>,
+    /// Second parameter of the curve on which another one starts in the same plane.
+    plane: Option<usize>,
 }
 
 /// Reads a curve and adds its plan to the items read so far.
@@ -125,7 +128,7 @@ pub(super) fn read(
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus | Kind::Grazing | Kind::ImpactGrazing => Some(Family::Cycle),
-        Kind::Homoclinic | Kind::Heteroclinic => Some(Family::Arc),
+        Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic => Some(Family::Arc),
         Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
     };
@@ -145,6 +148,9 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     if let Some((known, rest)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
         return match known.start {
             Start::EndOf(index) => switched(walk, value, of_branch(ground, known, index), known, rest),
+            Start::EndOfCurve(index) if rest.is_empty() && stays_in_plane(item, &ground.items.curves[index]) => {
+                in_plane(ground, known, index)
+            }
             Start::EndOfCurve(index) if rest.is_empty() => of_curve(walk, item, ground, known, index),
             _ => {
                 let (short, noun) = (&known.name, with_article(noun(&known.start)));
@@ -169,9 +175,45 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     None
 }
 
+/// True if the curve of this item starts at a point of codimension two of another curve, in the same two parameters.
+fn stays_in_plane(item: &Item, other: &CurvePlan) -> bool {
+    let hold = item.table.get("hold").and_then(|value| value.get_ref().as_str()).and_then(Kind::from_name);
+    matches!(
+        (other.hold, hold),
+        (Kind::Homoclinic, Some(Kind::SaddleNodeHomoclinic))
+            | (Kind::SaddleNodeHomoclinic | Kind::Fold | Kind::Hopf, Some(Kind::Homoclinic))
+    )
+}
+
+/// The base of a curve that starts on another one in the same two parameters: its branch, under its name and in its range.
+fn in_plane(ground: &Ground, known: &Known, index: usize) -> Option<Base> {
+    let curve = &ground.items.curves[index];
+    let own = |name: &str| {
+        // A switched branch is followed in the parameter of the branch it comes from.
+        let ends = || std::iter::once(name.len()).chain(name.rmatch_indices('/').map(|(end, _)| end));
+        ends().find_map(|end| ground.known(&name[..end]))
+    };
+    let parent = own(&curve.of)?;
+    let below = match parent.start {
+        Start::EndOf(index) => of_branch(ground, parent, index),
+        Start::EndOfCurve(index) => in_plane(ground, parent, index)?,
+        _ => return None,
+    };
+    let plan = BranchPlan { range: curve.ranges[0], ..below.plan };
+    Some(Base {
+        name: known.name.clone(),
+        plan,
+        beginning: known.beginning.clone(),
+        family: None,
+        curve: None,
+        plane: Some(curve.free),
+    })
+}
+
 pub(super) fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
     let plan = ground.items.branches[index].clone();
-    Base { name: known.name.clone(), plan, curve: None, beginning: known.beginning.clone(), family: known.family }
+    let (name, beginning) = (known.name.clone(), known.beginning.clone());
+    Base { name, plan, curve: None, beginning, family: known.family, plane: None }
 }
 
 /// A curve at an extremum of which another one starts, which must be one of folds or of such extrema.
@@ -210,7 +252,7 @@ fn of_curve(walk: &mut Walk, item: &Item, ground: &Ground, known: &Known, index:
         .iter()
         .find(|own| of.of.strip_prefix(&own.name).is_some_and(|rest| rest.is_empty() || rest.starts_with('/')));
     let (plan, beginning) = (plan?.clone(), known.beginning.clone());
-    Some(Base { name: known.name.clone(), plan, curve: Some(index), beginning, family: known.family })
+    Some(Base { name: known.name.clone(), plan, curve: Some(index), beginning, family: known.family, plane: None })
 }
 
 /// Applies the branch switches `/kind-number` in `steps` to a branch; without steps, returns the branch itself.
@@ -262,6 +304,10 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     };
     let wrong = match (kind, family) {
         (Kind::Fold | Kind::BranchPoint, Some(Family::Arc)) => None,
+        (Kind::SaddleNodeHomoclinic, Some(Family::Equilibrium)) => Some((
+            "orbits homoclinic to a saddle-node are not searched for from equilibria",
+            "homoclinic, or `of` a branch of cycles that ends at such an orbit",
+        )),
         (_, Some(Family::Arc)) => {
             Some(("solutions of boundary-value problems have only folds and branch points", "fold or branch-point"))
         }
@@ -443,6 +489,13 @@ fn second(walk: &mut Walk, item: &Item, ground: &Ground, base: Option<&Base>) ->
             None => "a curve needs a model with two parameters".to_string(),
         };
         walk.report(value.span(), message, right);
+        return None;
+    }
+    let other = base.and_then(|base| Some((base, base.plane?))).filter(|(_, other)| *other != second);
+    if let Some(((base, other), value)) = other.zip(item.table.get("free")) {
+        let names = [base.plan.free, other].map(|index| &ground.model.parameters[index].name);
+        let message = format!("the curve \"{}\" lies in the plane of {} and {}", base.name, names[0], names[1]);
+        walk.report(value.span(), message, format!("the second parameter of that curve, `{}`", names[1]));
         return None;
     }
     Some(second)

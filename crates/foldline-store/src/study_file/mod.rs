@@ -383,7 +383,7 @@ fn with_events(walk: &mut Walk, root: &DeTable, model: &Model) {
         let Some(value) = table.get("hold") else { continue };
         if matches!(
             value.as_ref().as_str(),
-            Some("branch-point" | "boundary-equilibrium" | "homoclinic" | "heteroclinic")
+            Some("branch-point" | "boundary-equilibrium" | "homoclinic" | "heteroclinic" | "saddle-node-homoclinic")
         ) {
             let message = "curves of this kind are not followed for models with events";
             walk.report(value.span(), message, "fold, period-doubling, torus, hopf or impact-grazing");

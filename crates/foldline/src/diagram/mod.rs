@@ -390,6 +390,8 @@ pub enum Kind {
     Homoclinic,
     /// An orbit that leads from one equilibrium to another; curves of such orbits only.
     Heteroclinic,
+    /// An orbit that leaves a saddle-node equilibrium and returns to it; curves of such orbits only.
+    SaddleNodeHomoclinic,
     /// On a curve of connecting orbits: the leading eigenvalues on both sides of the imaginary axis have equal distances
     /// from it, so that the saddle quantity vanishes.
     NeutralSaddle,
@@ -402,7 +404,8 @@ pub enum Kind {
     OrbitFlip,
     /// On a curve of connecting orbits: an invariant manifold returns tangent to an exceptional direction.
     InclinationFlip,
-    /// On a curve of homoclinic orbits: the saddle becomes a saddle-node, at which the orbit is non-central.
+    /// On a curve of connecting orbits: the equilibrium is a saddle-node, and the orbit returns along its strong stable, or leaves
+    /// along its strong unstable, manifold.
     NonCentral,
     /// On a curve of homoclinic orbits: the equilibrium has a Hopf bifurcation (Shilnikov–Hopf).
     ShilnikovHopf,
@@ -410,7 +413,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 36] = [
+    pub const ALL: [Kind; 37] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -440,6 +443,7 @@ impl Kind {
         Kind::Unexplained,
         Kind::Homoclinic,
         Kind::Heteroclinic,
+        Kind::SaddleNodeHomoclinic,
         Kind::NeutralSaddle,
         Kind::DoubleEigenvalue,
         Kind::ThreeLeading,
@@ -454,7 +458,7 @@ impl Kind {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
             && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding | Kind::ImpactGrazing | Kind::Peak)
-            && !matches!(self, Kind::Homoclinic | Kind::Heteroclinic)
+            && !matches!(self, Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -507,12 +511,13 @@ impl Kind {
             Kind::Unexplained => "unexplained",
             Kind::Homoclinic => "homoclinic",
             Kind::Heteroclinic => "heteroclinic",
+            Kind::SaddleNodeHomoclinic => "saddle-node-homoclinic",
             Kind::NeutralSaddle => "neutral-saddle",
             Kind::DoubleEigenvalue => "double-eigenvalue",
             Kind::ThreeLeading => "three-leading-eigenvalues",
             Kind::OrbitFlip => "orbit-flip",
             Kind::InclinationFlip => "inclination-flip",
-            Kind::NonCentral => "saddle-node-homoclinic",
+            Kind::NonCentral => "non-central-homoclinic",
             Kind::ShilnikovHopf => "shilnikov-hopf",
         }
     }
@@ -541,7 +546,8 @@ impl Kind {
             Kind::ThreeLeading => "three leading eigenvalues",
             Kind::OrbitFlip => "orbit flip",
             Kind::InclinationFlip => "inclination flip",
-            Kind::NonCentral => "saddle-node homoclinic",
+            Kind::SaddleNodeHomoclinic => "saddle-node homoclinic",
+            Kind::NonCentral => "non-central homoclinic",
             Kind::ShilnikovHopf => "Shilnikov–Hopf",
             other => other.name(),
         }
@@ -730,7 +736,8 @@ pub enum Ending {
     /// The branch met the one from which it (or a branch of its type) bifurcates: a cycle shrank to an equilibrium, or
     /// became a cycle of half the period.
     Joined {
-        /// `Hopf` (cycle became an equilibrium), `PeriodDoubling` (half the period) or `BranchPoint`.
+        /// `Hopf` (cycle became an equilibrium), `PeriodDoubling` (half the period), `BranchPoint`, or on a curve the point of
+        /// codimension two at which it ends.
         at: Kind,
         /// Value of the continuation parameter there.
         parameter: f64,
@@ -829,6 +836,14 @@ impl fmt::Display for Ending {
             }
             Ending::Joined { at: Kind::BoundaryEquilibrium, parameter } => {
                 write!(f, "ends at {:.9}, where the equilibrium reaches the surface of an event", Shown(*parameter))
+            }
+            Ending::Joined { at: Kind::NonCentral, parameter } => {
+                write!(
+                    f,
+                    "ends at a non-central orbit homoclinic to a saddle-node at {:.9}, where curves of orbits homoclinic to saddles \
+                     and to saddle-nodes meet",
+                    Shown(*parameter)
+                )
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),
@@ -958,7 +973,7 @@ impl Branch {
     /// True for a curve of orbits that connect equilibria; the spectra of its points are the eigenvalues at the
     /// equilibrium where the orbit begins.
     pub fn is_connecting(&self) -> bool {
-        matches!(self.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)))
+        matches!(self.held, Some((Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic, _)))
     }
 
     /// Inserts an accepted point at its position.

@@ -3,7 +3,8 @@
 //! **Idea.** A branch of cycles that ends with a period without bound leads to a homoclinic orbit: the last cycle is cut
 //! where it is closest to the equilibrium, and the ends are moved onto its invariant subspaces. The orbit is then
 //! lengthened by the linear flow next to the equilibrium until the estimated error of its truncation is far below the
-//! tolerance, and followed as a curve.
+//! tolerance, and followed as a curve. Cycles that approach an orbit homoclinic to a saddle-node are cut next to that, and the orbit
+//! is followed together with the fold. Curves of both kinds start from the non-central orbits in which the others end.
 
 use super::System;
 use super::arcs::damped;
@@ -11,15 +12,20 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use super::seeds::bare;
 use super::shooting::Search;
-use crate::continuation::corrector::parameter_row;
-use crate::continuation::{Failure, Settings};
+use crate::continuation::corrector::{Plane, parameter_row, settle};
+use crate::continuation::{Failure, Settings, Station};
 use crate::contract::{Batch, Examination, Observer, Parameters, VectorField, ZeroProblem};
-use crate::diagram::{Branch, Connection, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution, Symmetry};
+use crate::diagram::{
+    Branch, Connection, Cost, Cycle, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint, Symmetry,
+};
 use crate::linalg::{lu, max_abs};
-use crate::problem::connecting::longer::sampled;
+use crate::problem::connecting::longer::{longer, sampled};
 use crate::problem::connecting::{ConnectingField, Split};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::gauss::Scheme;
+use crate::special::connection::Limits;
+use crate::special::normal_form::{Local, Loops};
+use num_complex::Complex64;
 use std::ops::Range;
 
 /// Factor on the plan's tolerance, as for other curves.
@@ -37,6 +43,8 @@ const SHORTEST: f64 = 0.05;
 const LONGEST: f64 = 0.6;
 /// Relative correction at which Newton's method has all but converged.
 const CLOSE: f64 = 1e-4;
+/// Distances along a curve at which it is left from the point where it meets another one: a tenth of the longest step, then shorter.
+const DISTANCES: [f64; 4] = [0.02, 4e-3, 8e-4, 1.6e-4];
 /// Smallest distance from the equilibria, relative to the largest on the orbit, at which rounding does not matter yet.
 const LEAST: f64 = 1e-6;
 
@@ -50,16 +58,20 @@ pub(super) fn follow(
     earlier: Option<&Branch>,
     observer: &dyn Observer,
 ) -> (Branch, bool) {
-    let first = parent.free;
+    let first = parent.held.map_or(parent.free, |(_, first)| first);
     let known = earlier.filter(|branch| !branch.points.is_empty());
     let start = match known.and_then(|branch| branch.points.iter().find(|p| p.position == 0)) {
         Some(point) => revived(system, curve, point),
         None => at_end(system, plan, curve, parent),
     };
     let parameter = start.as_ref().map_or(f64::NAN, |start| start.point.parameters[first]);
-    let origin = match curve.hold {
-        Kind::Homoclinic | Kind::Heteroclinic if parent.family == Family::Cycle => Origin::EndOf(parent.name.clone()),
-        kind => Origin::Switch { parent: parent.name.clone(), kind, parameter },
+    let origin = match (special_of(curve, parent), parent.held) {
+        (Ok(special), Some(_)) => {
+            let parameter = special.point.parameters[parent.free];
+            Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter }
+        }
+        _ if parent.family == Family::Cycle => Origin::EndOf(parent.name.clone()),
+        _ => Origin::Switch { parent: parent.name.clone(), kind: curve.hold, parameter },
     };
     let mut branch = known.cloned().unwrap_or_else(|| Branch::new(&curve.name, Family::Arc, curve.free, origin));
     branch.held = Some((curve.hold, first));
@@ -71,7 +83,10 @@ pub(super) fn follow(
         Ok(start) => {
             let own = start.system(system);
             let value = start.point.parameters[curve.free];
-            let (settings, sides) = settings(&own, plan, curve, first, value);
+            let (settings, mut sides) = settings(&own, plan, curve, first, value);
+            if start.away_from.is_some() {
+                sides = [true; 2];
+            }
             let growth = Growth {
                 system: &own,
                 settings: &settings,
@@ -90,7 +105,7 @@ pub(super) fn follow(
                 let line = Line { held: branch.held, ..Line::new(curve.free) };
                 let mut problem = line.problem(&own, plan.degree, &start.point);
                 match growth::polished(&mut *problem, &settings, &start.point) {
-                    Ok(station) => growth.begin(&mut branch, Beginning::Inside(station)),
+                    Ok(station) => growth.begin(&mut branch, beginning(station, &own, curve, first, start.away_from)),
                     Err(why) => super::family::without_start(
                         observer,
                         &mut branch,
@@ -105,6 +120,26 @@ pub(super) fn follow(
         Err(why) => super::family::without_start(observer, &mut branch, why),
     };
     (branch, going)
+}
+
+/// The beginning of a curve: both sides, or only the one that leads away from the values of both parameters in `away_from`.
+fn beginning(
+    mut station: Station,
+    system: &System,
+    curve: &CurvePlan,
+    first: usize,
+    away_from: Option<[f64; 2]>,
+) -> Beginning {
+    let Some(at) = away_from else { return Beginning::Inside(station) };
+    let last = station.tangent.len() - 2;
+    let apart = [(first, at[0]), (curve.free, at[1])].into_iter().zip(&station.tangent[last..]);
+    let along: f64 =
+        apart.map(|((index, at), t)| (station.point.parameters[index] - at) / system.unit(index) * t).sum();
+    if along < 0.0 {
+        [&mut station.tangent, &mut station.point.tangent].into_iter().flatten().for_each(|t| *t = -*t);
+    }
+    let joined = Ending::Joined { at: Kind::BogdanovTakens, parameter: at[1] };
+    Beginning::Edge { before: Vec::new(), first: station, joined }
 }
 
 fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value: f64) -> (Settings, [bool; 2]) {
@@ -122,6 +157,8 @@ fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value
 struct Start<'s> {
     field: ConnectingField<'s>,
     point: Point,
+    /// Values of both parameters at the Bogdanov–Takens point from which the curve leads away.
+    away_from: Option<[f64; 2]>,
 }
 
 impl<'s> Start<'s> {
@@ -154,11 +191,22 @@ impl<'s> Start<'s> {
         let (n, parameters) = (self.field.dim(), &self.point.parameters);
         let profile = self.cycle().map_or(&[][..], |cycle| &cycle.profile);
         let far = |end: usize| {
-            let split = self.field.split(end, parameters)?;
+            let split = self.field.parts(end, parameters)?;
             let sizes = profile.chunks_exact(n).map(|x| split.size(&self.field.deviations([x, x], parameters)[end]));
             Some(sizes.fold(0.0, f64::max))
         };
         [0, 1].map(|end| far(end).unwrap_or(f64::NAN))
+    }
+
+    /// Distances of the ends at which a non-central orbit would leave or arrive at a saddle-node, in units of those at which terms
+    /// of fifth order, which its test function neglects, are below the tolerance.
+    fn distances_from_saddle_node(&self, tolerance: f64) -> [f64; 2] {
+        let (sizes, extents) = (self.field.sizes(&self.point.parameters), self.extents());
+        let strong = [self.field.unstable_off_axis() > 0, self.field.unstable_off_axis() + 1 < self.field.dim()];
+        [0, 1].map(|end| match self.field.is_at_saddle_node() && strong[end] {
+            true => sizes[end] / (tolerance.powf(0.2) * extents[end]),
+            false => 0.0,
+        })
     }
 
     /// The orbit.
@@ -179,10 +227,207 @@ fn unstable(system: &System, x: &[f64], parameters: &[f64]) -> Option<usize> {
 
 /// The field of a stored orbit.
 fn revived<'s>(system: &'s System, curve: &CurvePlan, point: &Point) -> Result<Start<'s>, String> {
-    let places = if curve.hold == Kind::Heteroclinic { 2 } else { 1 };
-    let field = ConnectingField::of_stored(system.field, &system.scales, places, &point.parameters);
-    let field = field.ok_or_else(|| "the stored orbit does not belong to a saddle of this model".to_string())?;
-    Ok(Start { field, point: point.clone() })
+    let field = ConnectingField::of_stored(system.field, &system.scales, curve.hold, &point.parameters);
+    let field = field.ok_or_else(|| "the stored orbit does not belong to an equilibrium of this model".to_string())?;
+    let parameters = field.completed(&point.parameters);
+    Ok(Start { field, point: Point { parameters, ..point.clone() }, away_from: None })
+}
+
+/// The special point of a curve `parent` at which another one starts.
+///
+/// # Errors
+/// A sentence that says why there is none.
+fn special_of<'b>(curve: &CurvePlan, parent: &'b Branch) -> Result<&'b SpecialPoint, String> {
+    let wanted = match (parent.held, curve.hold) {
+        (Some((Kind::SaddleNodeHomoclinic, _)), Kind::Homoclinic)
+        | (Some((Kind::Homoclinic, _)), Kind::SaddleNodeHomoclinic) => Kind::NonCentral,
+        (Some((Kind::Fold | Kind::Hopf, _)), Kind::Homoclinic) if parent.family == Family::Equilibrium => {
+            Kind::BogdanovTakens
+        }
+        _ => {
+            return Err(format!(
+                "no curve of {} orbits starts from {}\nlikely cause: such a curve starts from cycles, from equilibria, or at a point that \
+                 it has in common with another curve\nwhat to do: name another branch or curve as `of`",
+                curve.hold, parent.name
+            ));
+        }
+    };
+    let first = parent.held.map_or(parent.free, |(_, first)| first);
+    let value = |special: &SpecialPoint| special.point.parameters.get(first).copied().unwrap_or(f64::NAN);
+    let fitting = parent.special.iter().filter(|special| special.kind == wanted);
+    let found = match curve.near {
+        Some(near) => fitting.min_by(|a, b| (value(a) - near).abs().total_cmp(&(value(b) - near).abs())),
+        None => fitting.min_by_key(|special| special.point.position),
+    };
+    found.ok_or_else(|| {
+        let ends = parent.ends.iter().flatten().map(Ending::brief).collect::<Vec<_>>().join("; ");
+        format!(
+            "the curve {} has no {wanted} point, at which curves of {} orbits start ({ends})\nlikely cause: it left its ranges \
+             before it reached one\nwhat to do: widen the `range` of the curve, and that of its branch",
+            parent.name, curve.hold
+        )
+    })
+}
+
+/// The orbit next to the non-central one in which a curve of orbits homoclinic to saddles meets one of those homoclinic to
+/// saddle-nodes.
+fn beside_non_central<'s>(
+    system: &'s System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    parent: &Branch,
+) -> Result<Start<'s>, String> {
+    let special = special_of(curve, parent)?;
+    let at = &special.point;
+    let (kind, first) = parent.held.ok_or("the parent is no curve")?;
+    let lost = || format!("the non-central orbit of {} cannot be read", parent.name);
+    let old = ConnectingField::of_stored(system.field, &system.scales, kind, &at.parameters).ok_or_else(lost)?;
+    let Solution::Cycle(orbit) = &at.solution else { return Err(lost()) };
+    // The eigenvalue 0 counts as one of the side on which the orbit does not arrive along the strong manifold.
+    let field = if old.is_at_saddle_node() {
+        let tests = old.flips(orbit, &at.parameters).map(|own| own.map_or(f64::INFINITY, |own| own.value.abs()));
+        let count = old.unstable_off_axis() + usize::from(tests[0] < tests[1]);
+        ConnectingField::new(system.field, &system.scales, 1, count)
+    } else {
+        let [values, _] = old.saddles(&at.parameters).ok_or_else(lost)?;
+        let positive = values.iter().filter(|z| z.re > 0.0).count();
+        let smallest = values.iter().min_by(|a, b| a.re.abs().total_cmp(&b.re.abs())).ok_or_else(lost)?;
+        ConnectingField::at_saddle_node(system.field, &system.scales, positive - usize::from(smallest.re > 0.0))
+    };
+    let parameters = field.renewed(&at.parameters);
+    let start = Start { field, point: bare(&parameters, Solution::Cycle(orbit.clone())), away_from: None };
+    let start = settled(system, plan, curve, first, start)?;
+    // Off the point where they meet, to the side on which the orbits exist.
+    let own = start.system(system);
+    let line = Line { held: Some((curve.hold, first)), ..Line::new(curve.free) };
+    let settings = growth::settings(&own, SHARPER * plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    let exists = |point: &Point| {
+        if start.field.is_at_saddle_node() {
+            let Solution::Cycle(orbit) = &point.solution else { return false };
+            let tests = start.field.flips(orbit, &point.parameters);
+            return tests.iter().flatten().all(|test| test.value > 0.0);
+        }
+        let positive = |values: &Vec<Complex64>| values.iter().filter(|z| z.re > 0.0).count();
+        let count = start.field.saddles(&point.parameters).map(|[values, _]| positive(&values));
+        count == Some(start.field.unstable_off_axis())
+    };
+    let found = {
+        let mut problem = line.problem(&own, plan.degree, &start.point);
+        let met = growth::polished(&mut *problem, &settings, &start.point).map_err(|why| why.to_string())?;
+        DISTANCES.iter().flat_map(|distance| [*distance, -distance]).find_map(|distance| {
+            problem.set_mesh(&met.mesh);
+            problem.anchor(&met.u);
+            let guess = met.u.iter().zip(&met.tangent).map(|(u, t)| u + distance * t).collect();
+            let plane = Plane { row: met.tangent.clone(), base: met.u.clone(), distance };
+            let found = settle(&mut *problem, &settings, plane, guess, 1.0, &mut Cost::default()).ok()?;
+            exists(&found.point).then_some(found.point)
+        })
+    };
+    drop(own);
+    let point = found
+        .ok_or_else(|| format!("no {} orbit is found next to the non-central one of {}", curve.hold, parent.name))?;
+    Ok(Start { point: bare(&point.parameters, point.solution), ..start })
+}
+
+/// A homoclinic orbit next to a Bogdanov–Takens point of a curve of folds or Hopf points.
+fn beside_takens<'s>(
+    system: &'s System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    parent: &Branch,
+    first: usize,
+) -> Result<Start<'s>, String> {
+    /// Sizes of the first orbit relative to those of the states, in the order of trial.
+    const SIZES: [f64; 7] = [0.1, 0.03, 0.3, 0.01, 3e-3, 1.0, 1e-3];
+    /// Largest relative distance of the orbit from the approximate one: they agree to the order ε.
+    const NEAR: f64 = 0.3;
+    let special = special_of(curve, parent)?;
+    let at = &special.point;
+    let free = [first, curve.free];
+    let degenerate = || {
+        format!(
+            "the Bogdanov–Takens point of {} has no normal form from which a homoclinic orbit follows\nlikely cause: a or b vanishes, or \
+             the two parameters do not unfold the point, as with a symmetry\nwhat to do: start the curve from cycles",
+            parent.name
+        )
+    };
+    let local = Local::new(system.field, at).ok_or_else(degenerate)?;
+    let loops =
+        Loops::new(&local, &system.scales, free, free.map(|index| system.unit(index))).ok_or_else(degenerate)?;
+    let mut last = None;
+    for size in SIZES {
+        let eps = loops.of_size(size);
+        if eps > loops.largest() {
+            continue;
+        }
+        match on_loop(system, plan, curve, &loops, eps, first) {
+            Ok(start) => {
+                let (predicted, found) = (loops.parameters(eps), &start.point.parameters);
+                let scaled = |index: usize, value: f64| (value - at.parameters[index]) / system.unit(index);
+                let length = |all: &[f64]| free.iter().map(|k| scaled(*k, all[*k]).powi(2)).sum::<f64>().sqrt();
+                let off = free.iter().map(|k| ((predicted[*k] - found[*k]) / system.unit(*k)).powi(2)).sum::<f64>();
+                if off.sqrt() < NEAR * length(&predicted) {
+                    return Ok(Start { away_from: Some(free.map(|index| at.parameters[index])), ..start });
+                }
+                last.get_or_insert("Newton's method leads to another orbit".to_string());
+            }
+            Err(why) => {
+                last.get_or_insert(why.lines().next().unwrap_or_default().to_string());
+            }
+        }
+    }
+    Err(format!(
+        "no homoclinic orbit is found next to the Bogdanov–Takens point of {}: {}\nlikely cause: its normal form describes a small \
+         neighbourhood only, in which orbits are too small for the tolerance\nwhat to do: use a smaller tolerance, or start the curve from \
+         cycles or saddles nearby",
+        parent.name,
+        last.unwrap_or_else(|| "its normal form is too one-sided".into())
+    ))
+}
+
+/// The homoclinic orbit of a size ε.
+fn on_loop<'s>(
+    system: &'s System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    loops: &Loops,
+    eps: f64,
+    first: usize,
+) -> Result<Start<'s>, String> {
+    /// ξ at the ends, where the orbit of the normal form is closer to the saddle by a factor of 10⁻⁴, and mesh intervals.
+    const REACH: f64 = 6.0;
+    const INTERVALS: usize = 60;
+    let parameters = loops.parameters(eps);
+    let place = equilibrium(system, &loops.saddle(eps), &parameters)
+        .ok_or("Newton's method finds no saddle next to the point")?;
+    let count = unstable(system, &place, &parameters).ok_or("the equilibrium is not hyperbolic")?;
+    let (begin, end) = (loops.time(eps, -REACH), loops.time(eps, REACH));
+    let mesh: Vec<f64> = (0..=INTERVALS)
+        .map(|k| (loops.time(eps, REACH * (2.0 * k as f64 / INTERVALS as f64 - 1.0)) - begin) / (end - begin))
+        .collect();
+    let state = |t: f64| loops.state(eps, loops.phase(eps, begin + t * (end - begin)));
+    let profile = sampled(&mesh, &Scheme::new(plan.degree), &state);
+    let cycle = Cycle {
+        points: crate::problem::gauss::Points::Gauss,
+        period: end - begin,
+        forcing_periods: 1,
+        mesh: mesh.into(),
+        degree: plan.degree,
+        profile,
+        gain: vec![0.0; place.len()],
+    };
+    let orbit = Orbit {
+        parameters: &parameters,
+        cycle: &cycle,
+        times: [0.0, 1.0 - 1e-9],
+        places: &place,
+        count,
+        node: false,
+        gain: &[],
+    };
+    let start =
+        pieced(system, plan, &orbit)?.ok_or("the orbit of the normal form does not come close to the saddle")?;
+    settled(system, plan, curve, first, start)
 }
 
 /// The homoclinic orbit that the cycles at an end of a branch approach, at the values that the last cycle has of all
@@ -199,6 +444,19 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
             curve.hold
         ));
     }
+    match parent.held {
+        Some((Kind::Fold | Kind::Hopf, first)) => return beside_takens(system, plan, curve, parent, first),
+        Some(_) => return beside_non_central(system, plan, curve, parent),
+        None => {}
+    }
+    if parent.family == Family::Equilibrium && curve.hold == Kind::SaddleNodeHomoclinic {
+        return Err(format!(
+            "{} consists of equilibria, from which orbits homoclinic to a saddle-node are not searched for\nlikely cause: `of` is not \
+             the branch of cycles\nwhat to do: name a branch of cycles that ends at such an orbit, or a curve of homoclinic \
+             orbits that ends at one",
+            parent.name
+        ));
+    }
     if parent.family == Family::Equilibrium {
         return shot(system, plan, curve, parent);
     }
@@ -211,6 +469,13 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
     let ends = [(parent.points.first(), 0), (parent.points.last(), 1)];
     let mut fitting: Vec<(&Point, Option<Connection>)> =
         ends.into_iter().filter_map(|(point, side)| Some((point?, unbounded(&parent.ends[side])?))).collect();
+    // Ends of the kind asked for come first.
+    let meant = |connection: &Option<Connection>| {
+        (curve.hold == Kind::SaddleNodeHomoclinic) == (*connection == Some(Connection::SaddleNode))
+    };
+    if fitting.iter().any(|(_, connection)| meant(connection)) {
+        fitting.retain(|(_, connection)| meant(connection));
+    }
     let near = curve.near.unwrap_or(f64::NAN);
     fitting.sort_by(|a, b| (value(a.0) - near).abs().total_cmp(&(value(b.0) - near).abs()));
     let Some((point, connection)) = fitting.last().filter(|_| curve.near.is_none()).or(fitting.first()) else {
@@ -224,9 +489,18 @@ fn at_end<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branc
     match (curve.hold, connection) {
         (Kind::Homoclinic, Some(Connection::SaddleNode)) => Err(format!(
             "the cycles of {} approach an orbit homoclinic to a saddle-node, not to a saddle\nlikely cause: the period \
-             becomes infinite where two equilibria meet on the cycle\nwhat to do: follow the fold of the equilibria with \
-             `hold = \"fold\"`, on which such orbits lie",
-            parent.name
+             becomes infinite where two equilibria meet on the cycle\nwhat to do: use `hold = \"{}\"`",
+            parent.name,
+            Kind::SaddleNodeHomoclinic
+        )),
+        (Kind::SaddleNodeHomoclinic, Some(Connection::SaddleNode) | None) => {
+            cut_at_saddle_node(system, plan, curve, parent.free, point)
+        }
+        (Kind::SaddleNodeHomoclinic, _) => Err(format!(
+            "the cycles of {} do not approach an orbit homoclinic to a saddle-node\nlikely cause: they approach one of a saddle\nwhat to \
+             do: use `hold = \"{}\"`; where that curve meets a fold of the equilibria, this one can start",
+            parent.name,
+            Kind::Homoclinic
         )),
         (Kind::Homoclinic, Some(Connection::Heteroclinic)) => Err(format!(
             "the cycles of {} approach a heteroclinic cycle between several saddles\nlikely cause: the model is \
@@ -300,7 +574,6 @@ fn cut<'s>(
         system.norm(&off) > SAME
     };
     let near = |x: &[f64], y: &[f64]| {
-        const NEAR: f64 = 0.2;
         (0..n).all(|c| {
             let [low, high] = point.ranges.get(c).copied().unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
             (x[c] - y[c]).abs() <= NEAR * (high - low)
@@ -336,12 +609,65 @@ fn cut<'s>(
         ));
     }
     let gain: &[f64] = if between_two { &[] } else { &cycle.gain };
-    let orbit = Orbit { parameters: &point.parameters, cycle, times: [begin, until], places: &places, count, gain };
+    let orbit = Orbit {
+        parameters: &point.parameters,
+        cycle,
+        times: [begin, until],
+        places: &places,
+        count,
+        node: false,
+        gain,
+    };
     let start = pieced(system, plan, &orbit)?.ok_or_else(|| {
         "the last cycle does not come close enough to the equilibrium\nlikely cause: its period is not long yet\nwhat to \
          do: follow the branch of cycles further, with more `max-points`"
             .to_string()
     })?;
+    settled(system, plan, curve, first, start)
+}
+
+/// Largest distance of an equilibrium from the slowest point of a cycle, relative to the extents of that.
+const NEAR: f64 = 0.2;
+
+/// The orbit homoclinic to the saddle-node that the cycles of a branch in the parameter `first` approach.
+fn cut_at_saddle_node<'s>(
+    system: &'s System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    first: usize,
+    point: &Point,
+) -> Result<Start<'s>, String> {
+    let Solution::Cycle(cycle) = &point.solution else { return Err("the branch does not consist of cycles".into()) };
+    let unit = system.unit(first);
+    let limits = Limits { field: system.field, free: first, scales: &system.scales, unit, tolerance: plan.tolerance };
+    let slow = slow_points(system, cycle, &point.parameters);
+    let found = slow.first().and_then(|(t, x)| Some((*t, x, limits.fold_beside(x, &point.parameters)?)));
+    let near = |x: &[f64], y: &[f64]| {
+        x.iter().zip(y).zip(&point.ranges).all(|((x, y), [low, high])| (x - y).abs() <= NEAR * (high - low))
+    };
+    let Some((begin, _, (place, parameters, _))) = found.filter(|(_, x, (place, ..))| near(x, place)) else {
+        return Err(
+            "there is no saddle-node next to the slowest point of the last cycle\nlikely cause: the cycles approach an orbit \
+             of another kind, or their period is not long yet\nwhat to do: follow the branch of cycles further, with more `max-points`"
+                .into(),
+        );
+    };
+    let probe = ConnectingField::new(system.field, &system.scales, 1, 0);
+    let all = probe.parameters(&parameters, 1.0, &place, [1.0; 2], &[]);
+    let [mut values, _] = probe.saddles(&all).ok_or("the equilibrium has no eigenvalues")?;
+    values.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let count = values.iter().skip(1).filter(|z| z.re > 0.0).count();
+    let orbit = Orbit {
+        parameters: &parameters,
+        cycle,
+        times: [begin, begin + 1.0],
+        places: &place,
+        count,
+        node: true,
+        gain: &cycle.gain,
+    };
+    let start = pieced(system, plan, &orbit)?
+        .ok_or("the last cycle does not come close enough to the saddle-node\nlikely cause: its period is not long yet\nwhat to do: follow the branch of cycles further")?;
     settled(system, plan, curve, first, start)
 }
 
@@ -355,6 +681,8 @@ struct Orbit<'o> {
     places: &'o [f64],
     /// Number of their unstable eigenvalues.
     count: usize,
+    /// True if the equilibrium is a saddle-node.
+    node: bool,
     gain: &'o [f64],
 }
 
@@ -362,9 +690,12 @@ struct Orbit<'o> {
 /// come close enough.
 fn pieced<'s>(system: &'s System, plan: &Plan, orbit: &Orbit) -> Result<Option<Start<'s>>, String> {
     let (n, cycle) = (system.field.dim(), orbit.cycle);
-    let field = ConnectingField::new(system.field, &system.scales, orbit.places.len() / n, orbit.count);
+    let field = match orbit.node {
+        true => ConnectingField::at_saddle_node(system.field, &system.scales, orbit.count),
+        false => ConnectingField::new(system.field, &system.scales, orbit.places.len() / n, orbit.count),
+    };
     let probe = field.parameters(orbit.parameters, 1.0, orbit.places, [1.0; 2], orbit.gain);
-    let splits = [0, 1].map(|end| field.split(end, &probe));
+    let splits = [0, 1].map(|end| field.parts(end, &probe));
     let [Some(left), Some(right)] = &splits else { return Err("an equilibrium is not hyperbolic".into()) };
     let sides = Departure { field: &field, splits: [left, right], probe: &probe, cycle, times: orbit.times };
     let Some((from, to, sizes)) = sides.piece() else { return Ok(None) };
@@ -388,7 +719,7 @@ fn pieced<'s>(system: &'s System, plan: &Plan, orbit: &Orbit) -> Result<Option<S
         gain: vec![0.0; n],
     };
     drop(splits);
-    Ok(Some(Start { field, point: bare(&parameters, Solution::Cycle(solution)) }))
+    Ok(Some(Start { field, point: bare(&parameters, Solution::Cycle(solution)), away_from: None }))
 }
 
 /// The connecting orbit of saddles on a branch of equilibria, found by shooting.
@@ -410,6 +741,7 @@ fn shot<'s>(system: &'s System, plan: &Plan, curve: &CurvePlan, parent: &Branch)
         times: [0.0, 1.0 - 1e-9],
         places: &found.places,
         count,
+        node: false,
         gain: &[],
     };
     let start =
@@ -439,7 +771,8 @@ impl Departure<'_> {
     fn nonlinearity(&self, t: f64, end: usize) -> f64 {
         let x = self.cycle.state(t);
         let y = &self.field.deviations([&x, &x], self.probe)[end];
-        self.field.nonlinearity(end, y, self.probe)
+        // The flow next to a saddle-node is not linear.
+        if self.field.is_at_saddle_node() { 0.0 } else { self.field.nonlinearity(end, y, self.probe) }
     }
 
     /// Times, in periods, at which the cycle leaves the neighbourhood of one saddle and enters that of the other, and
@@ -475,13 +808,50 @@ fn share_for(goal: f64, error: f64) -> f64 {
     (0.5 * goal / error).sqrt().clamp(SHORTEST, 0.5)
 }
 
+/// The point of a curve with its orbit cut where the error of the truncation allows it.
+pub(super) fn shortened(growth: &Growth, system: &System, line: &Line, at: &Point) -> Option<Point> {
+    /// Least factor on the distances from the equilibria that is worth a new orbit, and the greatest at once.
+    const WORTH: f64 = 2.0;
+    const MOST: f64 = 1e6;
+    let Solution::Cycle(orbit) = &at.solution else { return None };
+    let mut problem = CycleProblem::like(line.setting(system, &at.parameters), orbit);
+    let u = problem.unknowns_of(at);
+    problem.anchor(&u);
+    problem.factorise(&u, &parameter_row(u.len())).ok()?;
+    let share = (MARGIN * growth.settings.tolerance / problem.truncation(&u)).sqrt().min(MOST);
+    drop(problem);
+    // The tangent space may have served so far, with a much larger error.
+    let shares = [share, MOST.sqrt(), MOST.sqrt().sqrt(), MOST.powf(0.125)].into_iter().filter(|share| *share > WORTH);
+    shares.into_iter().find_map(|share| resized(growth, system, line, at, share))
+}
+
+/// The point of a curve with the ends of its orbit moved by the factor `share`.
+fn resized(growth: &Growth, system: &System, line: &Line, at: &Point, share: f64) -> Option<Point> {
+    let Solution::Cycle(orbit) = &at.solution else { return None };
+    let of = |point: &Point, orbit: &Cycle| CycleProblem::like(line.setting(system, &point.parameters), orbit);
+    let (other, parameters) = system.field.lengthened(orbit, &at.parameters, share)?;
+    let mut start = bare(&parameters, Solution::Cycle(other.clone()));
+    let mut problem = of(&start, &other);
+    if let Some(u) = damped(&mut problem, &start, CLOSE) {
+        start = problem.point(&u, &[], Examination::default());
+    }
+    let found = growth::polished(&mut problem, growth.settings, &start).ok()?;
+    let mut point = Point { position: at.position, step: at.step, ..found.point };
+    // The direction of the curve is that of its scalars.
+    let scalars = system.field.determined().len() + 2;
+    let along: f64 = point.tangent.iter().rev().zip(at.tangent.iter().rev()).take(scalars).map(|(a, b)| a * b).sum();
+    if along < 0.0 {
+        point.tangent.iter_mut().for_each(|t| *t = -*t);
+    }
+    Some(point)
+}
+
 /// The point of a curve with its orbit lengthened, if the error of the truncation is what limits the curve there.
 pub(super) fn relengthened(growth: &Growth, system: &System, line: &Line, at: &Point) -> Option<Point> {
     /// Share of the tolerance from which on the truncation matters.
     const MATTERS: f64 = 0.25;
     let Solution::Cycle(orbit) = &at.solution else { return None };
-    let of = |point: &Point, orbit: &Cycle| CycleProblem::like(line.setting(system, &point.parameters), orbit);
-    let mut problem = of(at, orbit);
+    let mut problem = CycleProblem::like(line.setting(system, &at.parameters), orbit);
     let u = problem.unknowns_of(at);
     problem.anchor(&u);
     problem.factorise(&u, &parameter_row(u.len())).ok()?;
@@ -491,23 +861,7 @@ pub(super) fn relengthened(growth: &Growth, system: &System, line: &Line, at: &P
     }
     drop(problem);
     let share = share_for(MARGIN * tolerance, error);
-    let found = [share, share.sqrt(), share.powf(0.25)].into_iter().find_map(|share| {
-        let (longer, parameters) = system.field.lengthened(orbit, &at.parameters, share)?;
-        let mut start = bare(&parameters, Solution::Cycle(longer.clone()));
-        let mut problem = of(&start, &longer);
-        if let Some(u) = damped(&mut problem, &start, CLOSE) {
-            start = problem.point(&u, &[], Examination::default());
-        }
-        growth::polished(&mut problem, growth.settings, &start).ok()
-    })?;
-    let mut point = Point { position: at.position, step: at.step, ..found.point };
-    // The direction of the curve is that of its scalars.
-    let scalars = system.field.determined().len() + 2;
-    let along: f64 = point.tangent.iter().rev().zip(at.tangent.iter().rev()).take(scalars).map(|(a, b)| a * b).sum();
-    if along < 0.0 {
-        point.tangent.iter_mut().for_each(|t| *t = -*t);
-    }
-    Some(point)
+    [share, share.sqrt(), share.powf(0.25)].into_iter().find_map(|share| resized(growth, system, line, at, share))
 }
 
 /// The problem of the orbit in the branch's parameter, with the second one last, which stays.
@@ -573,7 +927,9 @@ fn settled<'s>(
         let goal = MARGIN * tolerance;
         let sizes = start.field.sizes(&start.point.parameters);
         let at_limit = sizes.iter().zip(start.extents()).all(|(size, extent)| *size < LEAST * extent);
-        if error <= goal || at_limit && error <= ENOUGH * tolerance {
+        let far = start.distances_from_saddle_node(tolerance);
+        let close = far.iter().all(|far| *far <= 1.0);
+        if close && (error <= goal || at_limit && error <= ENOUGH * tolerance) {
             return Ok(start);
         }
         if error.is_nan() {
@@ -582,7 +938,7 @@ fn settled<'s>(
                         parameters"
                 .into());
         }
-        if at_limit {
+        if at_limit && close {
             return Err(format!(
                 "the orbit cannot be lengthened until the error of its truncation, {error:.1e}, is below {goal:.1e}\n\
                  likely cause: an eigenvalue of the equilibrium is close to zero\nwhat to do: begin where the \
@@ -590,9 +946,22 @@ fn settled<'s>(
             ));
         }
         let orbit = start.cycle().ok_or("the orbit is not a cycle")?;
-        let share = share_for(goal, error).max(longest);
-        let (orbit, parameters) =
-            start.field.lengthened(orbit, &start.point.parameters, share).ok_or("the equilibrium is not hyperbolic")?;
+        let by_error = if error <= goal { 1.0 } else { share_for(goal, error) };
+        let shares = [0, 1].map(|end| {
+            // The error is of second order, or of fifth.
+            let own = match start.field.is_slow(end, &start.point.parameters) {
+                _ if !start.field.is_bound(end) => 1.0,
+                true => by_error.powf(0.4),
+                false => by_error,
+            };
+            // Nine tenths of the distance at which the terms neglected equal the tolerance.
+            let by_distance = if far[end] > 1.0 { 0.9 / far[end] } else { 1.0 };
+            own.min(by_distance).max(longest)
+        });
+        let (orbit, parameters) = longer(&start.field, orbit, &start.point.parameters, shares).ok_or(
+            "the time that the orbit spends next to the equilibrium is too long\nlikely cause: an eigenvalue of the equilibrium is close to \
+             zero, or the equilibrium is nearly a cusp\nwhat to do: begin at other values of the parameters, or use a larger tolerance",
+        )?;
         let guess = bare(&parameters, Solution::Cycle(orbit));
         match solved(&start, &guess) {
             Ok(found) => (start.point, error) = found,

@@ -163,7 +163,7 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
             curve.name
         ));
     }
-    if matches!(curve.hold, Kind::Homoclinic | Kind::Heteroclinic) {
+    if matches!(curve.hold, Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic) {
         return Err(format!(
             "no branch starts from connecting orbits\nlikely cause: {} is a curve of them, and an orbit exists for isolated \
              values of the branch's parameter only\nwhat to do: start from cycles or equilibria",

@@ -241,7 +241,7 @@ impl Work<'_> {
             };
             let earlier = self.earlier.branch(&curve.name);
             let follow = match curve.hold {
-                Kind::Homoclinic | Kind::Heteroclinic => connections::follow,
+                Kind::Homoclinic | Kind::Heteroclinic | Kind::SaddleNodeHomoclinic => connections::follow,
                 _ => curves::follow,
             };
             let (branch, going) = match curve.further.is_empty() {
@@ -251,7 +251,7 @@ impl Work<'_> {
             let ended = curves::end_of(self.system, self.plan, curve, &branch);
             self.branches.push(branch);
             let own = self.branches.len() - 1;
-            // Other curves start at the extrema of this one.
+            // Other curves start at its extrema and at its points of codimension two.
             if !going || !self.curves(own..own + 1) || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
                 return false;
             }

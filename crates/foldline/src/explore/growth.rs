@@ -9,7 +9,7 @@ use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Condition, Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{
-    Branch, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
+    Branch, Connection, Cost, Ending, Family, Kind, NULL_SPACE, Origin, Point, Record, STANDS, Solution, SpecialPoint,
 };
 use crate::problem::gauss::Points;
 use crate::problem::impact::{ImpactProblem, stored::impacts};
@@ -651,7 +651,24 @@ impl Growth<'_> {
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let (connecting, line) = (branch.is_connecting(), self.line(branch));
-        let at_axis = |at: &Point| limit::reached(at).filter(|_| connecting);
+        let node = matches!(branch.held, Some((Kind::SaddleNodeHomoclinic, _)));
+        // The leading rate at which an orbit was last cut; it is tried again where that has halved.
+        let (cut_at, too_long) = (Cell::new(f64::INFINITY), Cell::new(false));
+        let held_here = branch.held;
+        let at_axis = |at: &Point| {
+            if !connecting {
+                return None;
+            }
+            let long = limit::long(at, system.field.time_unit(&at.parameters)).filter(|rate| 2.0 * rate < cut_at.get());
+            too_long.set(long.is_some());
+            cut_at.set(long.unwrap_or(cut_at.get()));
+            let ends = limit::reached(at, node).or_else(|| {
+                let (_, first) = held_here.filter(|(kind, _)| *kind == Kind::Homoclinic)?;
+                let free = [first, free].map(|index| (index, system.unit(index)));
+                limit::at_takens(system.field, &system.scales, free, self.settings.tolerance, at)
+            });
+            ends.or(long.map(|_| Ending::Stopped))
+        };
         let next_points: RefCell<Option<Points>> = RefCell::default();
         let may_change = Cell::new(branch.held.is_none() && system.holds.is_none());
         // Asked only where the branch has not ended, so that a change of the points hides no end.
@@ -700,6 +717,11 @@ impl Growth<'_> {
                         && beside_impacts::grazes(system.field, &special.point)
                     {
                         return Verdict::Continue;
+                    }
+                    if special.kind == Kind::NonCentral {
+                        // Its position depends on where the orbit is cut. The terms that its test function neglects are below the tolerance.
+                        let cut = special.point.trust.discretisation;
+                        special.error += self.settings.tolerance + if cut.is_finite() { cut } else { 0.0 };
                     }
                     let plain = special.clone();
                     if special.kind == Kind::ImpactGrazing && branch.held.is_some() {
@@ -786,21 +808,28 @@ impl Growth<'_> {
         }
         // A connecting orbit that has come to need longer ends goes on with them.
         for _ in 0..LENGTHENINGS {
+            let long = too_long.take() && ending == Ending::Stopped;
             let short =
                 connecting && matches!(ending, Ending::StepTooSmall(_) | Ending::MeshTooLarge(_) | Ending::GivenUp(_));
-            let there = latest.borrow().clone();
-            let Some(mut next) = Some(there)
-                .filter(|_| short && !self.observer.stopping())
-                .and_then(|there| connections::relengthened(self, &system, &line, &there))
-            else {
+            if !(short || long) || self.observer.stopping() {
                 break;
+            }
+            let there = latest.borrow().clone();
+            let found = match long {
+                true => connections::shortened(self, &system, &line, &there),
+                false => connections::relengthened(self, &system, &line, &there),
             };
-            next.position += if side == 1 { 1 } else { -1 };
+            let (mut next, is_new) = match found {
+                Some(next) => (next, true),
+                None if long => (there, false),
+                None => break,
+            };
+            next.position += if side == 1 { 1 } else { -1 } * i64::from(is_new);
             let mut problem = line.problem(&system, self.degree, &next);
             let Ok(start) = revived(&mut *problem, self.settings, &next, direction) else { break };
             let mut walk = Follow { holds: false, limit: &|_| None, corner: &at_axis, ..walk.on(&mut *problem) };
             let position = next.position.unsigned_abs() as usize;
-            ending = match sink(Item::Point(next)) == Verdict::Stop {
+            ending = match is_new && sink(Item::Point(next)) == Verdict::Stop {
                 true => Ending::Stopped,
                 false => follow(&mut walk, start, None, position, &mut sink),
             };
@@ -808,6 +837,9 @@ impl Growth<'_> {
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
             return Ending::Stopped;
+        }
+        if too_long.get() && ending == Ending::Stopped {
+            ending = Ending::GivenUp("the orbit next to the equilibrium grew too long too often".into());
         }
         while let Some(points) = next_points.take() {
             // A branch that has returned to Gauss points stays there.
@@ -842,10 +874,18 @@ impl Growth<'_> {
         }
         match ending {
             Ending::StepTooSmall(why) if branch.is_connecting() => {
-                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why))
+                Ending::StepTooSmall(on_connections::at_bifurcation(&latest.borrow(), why, node))
             }
             Ending::GivenUp(why) if branch.is_connecting() => {
-                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why))
+                Ending::GivenUp(on_connections::at_bifurcation(&latest.borrow(), why, node))
+            }
+            Ending::PeriodUnbounded(period) if free_cycles => {
+                // The saddle-node is solved for, so that the last cycle need not have its parameter to the tolerance: the law of the
+                // period decides, which holds to first order in the distance.
+                const NEAR: f64 = 1e-2;
+                let near = Limits { tolerance: NEAR, ..limits }.approached(&latest.borrow());
+                let node = |end: &Ending| matches!(end, Ending::Connecting { connection: Connection::SaddleNode, .. });
+                near.filter(node).unwrap_or(Ending::PeriodUnbounded(period))
             }
             Ending::StepTooSmall(why) if branch.family == Family::Torus => {
                 Ending::StepTooSmall(tori::likely_cause(&latest.borrow(), &why))

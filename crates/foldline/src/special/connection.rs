@@ -168,7 +168,24 @@ impl Limits<'_> {
     ) -> Option<(Connection, f64, String)> {
         let slowest = nodes.iter().min_by(|a, b| a.speed.total_cmp(&b.speed))?;
         let n = slowest.x.len();
-        let (mut x, mut at) = (slowest.x.clone(), parameters.to_vec());
+        let (x, at, v) = self.fold_beside(&slowest.x, parameters)?;
+        let (there, here) = (at[self.free], parameters[self.free]);
+        let near = (there - here).abs() <= self.tolerance * (self.unit + there.abs());
+        if !near || self.apart(&x, &slowest.x, extents) > BALL {
+            return None;
+        }
+        let w = self.null_vector(&x, &at, true)?;
+        let bent = self.derivative(&x, &at, &[&self.padded(&v), &self.padded(&v)]);
+        let along = self.derivative(&x, &at, &[&self.along_parameter(n)]);
+        let product = 0.5 * dot(&w, &along) * dot(&w, &bent) / dot(&w, &v).powi(2);
+        let time = PI / (product * (here - there)).sqrt();
+        (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, self.place(&x)))
+    }
+
+    /// State, parameters and null vector that solve (2), from a state and parameters nearby.
+    pub fn fold_beside(&self, beside: &[f64], parameters: &[f64]) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
+        let n = beside.len();
+        let (mut x, mut at) = (beside.to_vec(), parameters.to_vec());
         let first = self.null_vector(&x, &at, false)?;
         let mut v = first.clone();
         let size = 2 * n + 1;
@@ -206,17 +223,7 @@ impl Limits<'_> {
                 break;
             }
         }
-        let (there, here) = (at[self.free], parameters[self.free]);
-        let near = (there - here).abs() <= self.tolerance * (self.unit + there.abs());
-        if !near || self.apart(&x, &slowest.x, extents) > BALL {
-            return None;
-        }
-        let w = self.null_vector(&x, &at, true)?;
-        let bent = self.derivative(&x, &at, &[&self.padded(&v), &self.padded(&v)]);
-        let along = self.derivative(&x, &at, &[&self.along_parameter(n)]);
-        let product = 0.5 * dot(&w, &along) * dot(&w, &bent) / dot(&w, &v).powi(2);
-        let time = PI / (product * (here - there)).sqrt();
-        (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, self.place(&x)))
+        Some((x, at, v))
     }
 
     /// Distance of two states, with angles taken between their nearest copies.

@@ -88,6 +88,7 @@ pub fn monitors_where_held<'a>(
 ) -> Vec<Box<dyn Monitor + 'a>> {
     let mut all = match held {
         Kind::Homoclinic | Kind::Heteroclinic => on_connections::monitors(field),
+        Kind::SaddleNodeHomoclinic => on_connections::monitors_at_saddle_nodes(field),
         _ => codim_two::monitors(field, scales, family, held),
     };
     all.push(Box::new(fold::Turn { free }));

@@ -8,7 +8,7 @@
 //! | neutral saddle | σ = Re λ_s + Re λ_u, the saddle quantity |
 //! | double eigenvalue | the discriminant (λ_1 - λ_2)² of the two leading eigenvalues of one side |
 //! | three leading eigenvalues | Re λ_1 - Re λ_3 of a leading pair and the next real one, or the other way round |
-//! | saddle-node homoclinic | the eigenvalue of smallest modulus |
+//! | non-central homoclinic | the leading eigenvalue, if it is real; for orbits homoclinic to a saddle-node ⟨p, x(T) - x_1⟩ of the left null vector p, with terms of second order |
 //! | Shilnikov–Hopf | the smallest real part of a pair |
 //! | orbit flip | ⟨p, x(T) - x_1⟩ of the leading left eigenvector p, at the end; likewise at the start |
 //! | inclination flip | ⟨q, ψ(0)⟩ of the leading right eigenvector q and the adjoint solution ψ; likewise at the end |
@@ -20,7 +20,7 @@
 pub mod limit;
 
 use crate::contract::{Monitor, Sight, Turning, VectorField};
-use crate::diagram::{Kind, Point, Solution};
+use crate::diagram::{Ending, Kind, Point, Solution};
 use crate::linalg::dot;
 use num_complex::Complex64;
 
@@ -30,16 +30,26 @@ pub struct OnConnection<'a> {
     field: &'a dyn VectorField,
     kind: Kind,
     side: f64,
+    /// True for orbits homoclinic to a saddle-node.
+    node: bool,
 }
 
 /// Monitors for a curve of connecting orbits.
 pub fn monitors<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
     let both = [Kind::DoubleEigenvalue, Kind::ThreeLeading, Kind::NonCentral, Kind::ShilnikovHopf];
-    let own = |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side }) as Box<dyn Monitor + 'a>;
+    let own =
+        |kind: Kind, side: f64| Box::new(OnConnection { field, kind, side, node: false }) as Box<dyn Monitor + 'a>;
     let sides = both.into_iter().flat_map(|kind| [own(kind, 1.0), own(kind, -1.0)]);
     let flips = [Kind::OrbitFlip, Kind::InclinationFlip].into_iter();
     let flips = flips.flat_map(|kind| [own(kind, -1.0), own(kind, 1.0)]);
     std::iter::once(own(Kind::NeutralSaddle, 1.0)).chain(sides).chain(flips).collect()
+}
+
+/// Monitors for a curve of orbits homoclinic to saddle-nodes.
+pub fn monitors_at_saddle_nodes<'a>(field: &'a dyn VectorField) -> Vec<Box<dyn Monitor + 'a>> {
+    let own =
+        |side: f64| Box::new(OnConnection { field, kind: Kind::NonCentral, side, node: true }) as Box<dyn Monitor + 'a>;
+    vec![own(-1.0), own(1.0)]
 }
 
 /// Eigenvalues of one side of the imaginary axis by their distance from it, as positive real parts.
@@ -62,16 +72,25 @@ pub fn quantity_of(values: &[Complex64]) -> Option<f64> {
 
 /// Text of an ending on a curve of connecting orbits, with the likely cause if an eigenvalue at `at` is close to the
 /// imaginary axis.
-pub fn at_bifurcation(at: &Point, why: String) -> String {
+///
+/// At a saddle-node, another eigenvalue than 0 is meant.
+pub fn at_bifurcation(at: &Point, why: String, node: bool) -> String {
     /// Ratio of the smallest to the largest distance from the axis. A factor of safety: the steps shorten as it
     /// decreases.
     const NEAR: f64 = 0.05;
     let sizes = at.spectrum.iter().map(|z| z.re.abs());
     let largest = sizes.fold(0.0, f64::max);
-    let close = at.spectrum.iter().min_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
+    let mut by_size: Vec<&Complex64> = at.spectrum.iter().collect();
+    by_size.sort_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
+    let close = by_size.get(usize::from(node));
     let Some(z) = close.filter(|z| z.re.abs() < NEAR * largest) else { return why };
     let first = why.lines().next().unwrap_or_default();
     let (value, what, cure) = match z.im == 0.0 {
+        true if node => (
+            format!("a second eigenvalue, {:.2e},", z.re),
+            "the curve ends at a Bogdanov–Takens point",
+            "follow the fold of the equilibria, on which this point lies",
+        ),
         true => (
             format!("the eigenvalue {:.2e}", z.re),
             "the curve ends at an orbit homoclinic to a saddle-node",
@@ -79,7 +98,7 @@ pub fn at_bifurcation(at: &Point, why: String) -> String {
         ),
         false => (
             format!("the pair of eigenvalues {:.2e} ± {:.2e} i", z.re, z.im.abs()),
-            "the curve ends where the equilibrium has a Hopf bifurcation",
+            "the curve ends at a Shilnikov–Hopf point, where the equilibrium has a Hopf bifurcation",
             "follow the Hopf points of the equilibria",
         ),
     };
@@ -94,28 +113,39 @@ fn group(values: &[Complex64]) -> usize {
 }
 
 impl OnConnection<'_> {
-    /// Eigenvalues of the side, at its end of the orbit.
+    /// Eigenvalues of the side, at its end of the orbit, by their distances from the axis. They are told by their number, so that
+    /// they are the same ones where the leading one crosses the axis.
     fn own(&self, at: &Point) -> Option<Vec<Complex64>> {
         let [start, end] = self.field.saddles(&at.parameters)?;
-        Some(of_side(if self.side > 0.0 { &start } else { &end }, self.side))
+        let mut all = if self.side > 0.0 { start } else { end };
+        all.sort_by(|a, b| (self.side * a.re).total_cmp(&(self.side * b.re)));
+        let unstable = *at.parameters.last()? as usize;
+        let count = if self.side > 0.0 { unstable } else { all.len().checked_sub(unstable)? };
+        Some(all.split_off(all.len().checked_sub(count)?).into_iter().map(|z| self.side * z).collect())
+    }
+
+    /// Sum of the distances from the axis of the leading eigenvalues, that of the stable ones negative.
+    fn quantity(&self, at: &Point) -> Option<f64> {
+        let leading = |side: f64| Some(OnConnection { side, ..*self }.own(at)?.first()?.re);
+        Some(leading(1.0)? - leading(-1.0)?)
     }
 
     /// Test function of a flip.
     fn turning(&self, at: &Point) -> Option<Turning> {
         let Solution::Cycle(orbit) = &at.solution else { return None };
         let later = if self.side > 0.0 { 1 } else { 0 };
-        let first = if self.kind == Kind::OrbitFlip { 0 } else { 2 };
+        let first = if self.kind == Kind::InclinationFlip { 2 } else { 0 };
         self.field.flips(orbit, &at.parameters).into_iter().nth(first + later).flatten()
     }
 
     fn is_flip(&self) -> bool {
-        matches!(self.kind, Kind::OrbitFlip | Kind::InclinationFlip)
+        self.node || matches!(self.kind, Kind::OrbitFlip | Kind::InclinationFlip)
     }
 
     fn tested(&self, at: &Point) -> Option<f64> {
         let own = self.own(at)?;
         match self.kind {
-            Kind::NeutralSaddle => saddle_quantity(self.field, at),
+            Kind::NeutralSaddle => self.quantity(at),
             Kind::DoubleEigenvalue => {
                 let gap = own.get(1)? - own.first()?;
                 Some((gap * gap).re)
@@ -131,8 +161,8 @@ impl OnConnection<'_> {
                     _ => None,
                 }
             }
-            Kind::NonCentral => own.iter().filter(|z| z.im == 0.0).map(|z| z.re).reduce(f64::min),
-            Kind::ShilnikovHopf => own.iter().filter(|z| z.im != 0.0).map(|z| z.re).reduce(f64::min),
+            Kind::NonCentral => own.first().filter(|z| z.im == 0.0).map(|z| z.re),
+            Kind::ShilnikovHopf => own.first().filter(|z| z.im != 0.0).map(|z| z.re),
             _ => None,
         }
     }
@@ -160,6 +190,13 @@ impl Monitor for OnConnection<'_> {
         }
         let Some((own, value)) = self.own(at).zip(self.tested(at)) else { return false };
         let size = own.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+        // The vanishing eigenvalue may be the only one of its side.
+        let size = match self.kind {
+            Kind::NonCentral | Kind::ShilnikovHopf => {
+                self.field.saddles(&at.parameters).iter().flatten().flatten().fold(size, |m, z| m.max(z.norm()))
+            }
+            _ => size,
+        };
         value.abs() < NEAR * size * if self.kind == Kind::DoubleEigenvalue { size } else { 1.0 }
     }
 
@@ -194,6 +231,11 @@ impl Monitor for OnConnection<'_> {
         0
     }
 
+    fn ending(&self, _at: &Point, parameter: f64) -> Option<Ending> {
+        let ends = matches!(self.kind, Kind::NonCentral | Kind::ShilnikovHopf);
+        ends.then_some(Ending::Joined { at: self.kind, parameter })
+    }
+
     fn remark(&self, at: &Point, _forwards: bool) -> String {
         let Some([start, end]) = self.field.saddles(&at.parameters) else { return String::new() };
         let kinds = [of_side(&start, 1.0), of_side(&end, -1.0)].map(|own| group(&own));
@@ -204,6 +246,12 @@ impl Monitor for OnConnection<'_> {
             (Kind::NeutralSaddle, _) => "neutral saddle-focus (Belyakov)".into(),
             (Kind::DoubleEigenvalue, _) => format!("of the {side} eigenvalues: from saddle to saddle-focus (Belyakov)"),
             (Kind::ThreeLeading, _) => format!("of the {side} eigenvalues"),
+            (Kind::NonCentral, _) => {
+                // On a curve of orbits homoclinic to saddles, the eigenvalue 0 is one of the other side.
+                let leaves = (self.side > 0.0) == self.node;
+                let how = if leaves { "leaves along the strong unstable" } else { "returns along the strong stable" };
+                format!("{how} manifold of a saddle-node")
+            }
             (Kind::OrbitFlip, _) if self.side > 0.0 => "leaves along the strong unstable manifold".into(),
             (Kind::OrbitFlip, _) => "returns along the strong stable manifold".into(),
             (Kind::InclinationFlip, _) => format!("of the {side} manifold"),

@@ -13,7 +13,7 @@
 
 use super::{Check, Quantity, Undecided, Verified};
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Branch, Cycle, Kind, Point, Solution};
+use crate::diagram::{Branch, Cycle, Point, Solution};
 use crate::explore::System;
 use crate::linalg::{larger, max_abs};
 use crate::problem::connecting::ConnectingField;
@@ -24,6 +24,10 @@ const ROUNDING: f64 = 1e-11;
 /// Distance from the equilibrium at which a comparison trajectory begins, relative to that of the end of the orbit. The
 /// deviation of the tangent space from the manifold is a hundredth there.
 const CLOSER: f64 = 0.1;
+
+/// That distance where the orbit must not drift along a direction in which the flow is slow: no deviation decays on the way, and the
+/// orbit approaches fast.
+const MUCH_CLOSER: f64 = 1e-4;
 
 /// Reason why special points are not verified.
 const SPECIAL: &str = "special points of boundary-value problems and connecting orbits are not located again";
@@ -77,12 +81,8 @@ fn connecting<'s>(
     branch: &Branch,
     point: &Point,
 ) -> Option<Result<ConnectingField<'s>, &'static str>> {
-    let places = match branch.held {
-        Some((Kind::Homoclinic, _)) => 1,
-        Some((Kind::Heteroclinic, _)) => 2,
-        _ => return None,
-    };
-    let found = ConnectingField::of_stored(system.field, &system.scales, places, &point.parameters);
+    let kind = branch.held.map(|(kind, _)| kind).filter(|_| branch.is_connecting())?;
+    let found = ConnectingField::of_stored(system.field, &system.scales, kind, &point.parameters);
     Some(found.ok_or("the equilibrium of the orbit is too close to a bifurcation"))
 }
 
@@ -130,7 +130,8 @@ impl Recomputed<'_> {
             all.push([value.abs() / own, worst[1]]);
         }
         if let Some(orbit) = orbit {
-            for end in 0..2 {
+            // Where the orbit is free to arrive, no manifold is approximated.
+            for end in (0..2).filter(|end| orbit.is_bound(*end)) {
                 all.push([self.off_manifold(orbit, &integrator, end)?, stated]);
             }
         }
@@ -159,10 +160,17 @@ impl Recomputed<'_> {
         let parameters = &self.point.parameters;
         let ends = [self.cycle.state(0.0), self.cycle.end()];
         let y = &orbit.deviations([&ends[0], &ends[1]], parameters)[end];
-        let split = orbit.split(end, parameters).ok_or("the equilibrium of the orbit is too close to a bifurcation")?;
+        let split = orbit.parts(end, parameters).ok_or("the equilibrium of the orbit is too close to a bifurcation")?;
         let side = if end == 0 { 1.0 } else { -1.0 };
-        let time = split.time_to(y, side, CLOSER).ok_or("the orbit does not approach the equilibrium")?;
-        let closer = split.flow(y, side, -side * time);
+        // Next to a bifurcation the linear flow leads nowhere.
+        let (time, closer) = match (orbit.is_slow(end, parameters), orbit.creeps(end, parameters)) {
+            (true, true) => orbit.approached(end, y, parameters, CLOSER),
+            (slow, _) => {
+                let share = if slow { MUCH_CLOSER } else { CLOSER };
+                split.time_to(y, side, share).map(|time| (time, split.flow(y, side, -side * time)))
+            }
+        }
+        .ok_or("the orbit does not approach the equilibrium")?;
         let start: Vec<f64> = ends[end]
             .iter()
             .zip(y.iter().zip(&closer))
@@ -172,8 +180,19 @@ impl Recomputed<'_> {
         let span = side * time / orbit.time_unit(parameters);
         let back =
             integrator.state_after(&start, [0.0, span]).ok_or("the integrator did not reach the end of a piece")?;
-        let both = if end == 0 { [&back[..], &ends[1]] } else { [&ends[0][..], &back] };
-        let arrived = &orbit.deviations(both, parameters)[end];
+        // On to the plane through the end: the time was that of the approximate flow.
+        let mut back = back;
+        let of = |back: &[f64]| -> Vec<f64> {
+            let both = if end == 0 { [back, &ends[1]] } else { [&ends[0][..], back] };
+            orbit.deviations(both, parameters)[end].clone()
+        };
+        for _ in 0..if orbit.is_slow(end, parameters) { 2 } else { 0 } {
+            let Some(rest) = orbit.time_to_plane(end, &of(&back), &back, parameters) else { break };
+            back = integrator
+                .state_after(&back, [0.0, rest / orbit.time_unit(parameters)])
+                .ok_or("the integrator did not reach the end of a piece")?;
+        }
+        let arrived = &of(&back);
         let off: Vec<f64> = arrived.iter().zip(y).map(|(a, b)| a - b).collect();
         let across = split.part(&off, -side);
         let sizes = self.cycle.profile.iter().enumerate();

@@ -196,7 +196,7 @@ pub fn verify(
         let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
         let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
         seen += candidates.len();
-        let connecting = matches!(branch.held, Some((Kind::Homoclinic | Kind::Heteroclinic, _)));
+        let connecting = branch.is_connecting();
         if system.is_open() || connecting {
             out.add(arcs::verify(system, branch, &chosen, accuracies(tolerance)[0]));
             continue;

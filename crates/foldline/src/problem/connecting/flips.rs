@@ -15,12 +15,21 @@
 //!   (3)  ψ_j = Φ_jᵀ ψ_{j+1},   P_uᵀ(x_0) ψ_0 = 0,   P_sᵀ(x_1) ψ_M = 0
 //! ```
 //!
+//! An orbit homoclinic to a saddle-node usually arrives along the null vector v of A; where it arrives along the strong stable
+//! manifold, it is non-central. On that manifold ⟨w, y⟩ of the left null vector w, ⟨w, D²f[v, v]⟩ > 0, has terms exp(-k λ t), k ≥ 2, of which
+//! three are annihilated as in (7) of [`super`]:
+//!
+//! ```text
+//!   (4)  -⟨w, y_1 + 26/24 x' / λ + 9/24 x'' / λ² + 1/24 x''' / λ³⟩ / |y_1|        x' = f(x(1))
+//!   (5)   ⟨w, y_0 + …⟩ / |y_0|       with -λ, for the strong unstable manifold
+//! ```
+//!
 //! (3) is singular by one. A random border makes it regular; its solution is the null vector.
 //!
 //! **Source.** champneys1996, §2; Φ_j by the Magnus expansion of fourth order, blanes2009, §5.
 
 use super::ConnectingField;
-use super::splitting::{identity, product, row_basis, transposed};
+use super::splitting::{identity, product, row_basis, times, transposed};
 use crate::contract::{Turning, VectorField};
 use crate::diagram::Cycle;
 use crate::linalg::{dot, lu, max_abs};
@@ -78,6 +87,10 @@ fn exponential(a: &[f64], n: usize) -> Vec<f64> {
 impl ConnectingField<'_> {
     /// (1) and (2): orbit flips at the end and at the start, inclination flips of the stable and the unstable manifold.
     pub(super) fn turnings(&self, orbit: &Cycle, parameters: &[f64]) -> [Option<Turning>; 4] {
+        if self.node {
+            let [end, start] = self.sides_of_centre(orbit, parameters);
+            return [end, start, None, None];
+        }
         let n = self.dim();
         let places = [0, 1].map(|end| self.saddle(&parameters[self.place(end)], parameters, &[]));
         let values = [0, 1].map(|end: usize| eigenvalues(&places[end].a, n, &vec![1.0; n]));
@@ -104,6 +117,36 @@ impl ConnectingField<'_> {
             Some(Turning { value: grown * dot(&q, own), refer })
         };
         [orbit_flip(1, -1.0), orbit_flip(0, 1.0), inclination_flip(0, -1.0), inclination_flip(1, 1.0)]
+    }
+
+    /// (4) and (5), positive for a central orbit; at the start only if there are unstable eigenvalues.
+    fn sides_of_centre(&self, orbit: &Cycle, parameters: &[f64]) -> [Option<Turning>; 2] {
+        let n = self.dim();
+        let at = self.saddle(&parameters[self.place(0)], parameters, &[]);
+        let values = self.eigenvalues_of(&at.a);
+        let below = self.below(0);
+        let rates = [below.checked_sub(1).map(|k| -values[k].re), values.get(below + 1).map(|z| z.re)];
+        let ends = [orbit.state(0.0), orbit.end()];
+        let ys = self.deviations([&ends[0], &ends[1]], parameters);
+        let side = |end: usize| {
+            let rate = rates[1 - end]?;
+            let p = eigenvector(&transposed(&at.a, n), values[below].re, n)?;
+            let (y, [d1, d2, d3, _]) = (&ys[end], self.motions(&ends[end], parameters));
+            // The flow along the null vector grows with its square, in the direction of positive values.
+            let q = eigenvector(&at.a, values[below].re, n)?;
+            let mut d = vec![0.0; n + self.known()];
+            (0..n).for_each(|c| d[c] = q[c] * self.scales[c]);
+            let bent = times(&self.turned(&at, parameters, &d), &q);
+            let outwards = dot(&p, &bent).signum();
+            let sign = if end == 0 { outwards } else { -outwards };
+            let rate = if end == 0 { -rate } else { rate };
+            let value = dot(&p, y)
+                + 26.0 / 24.0 * dot(&p, &d1) / rate
+                + 9.0 / 24.0 * dot(&p, &d2) / rate.powi(2)
+                + 1.0 / 24.0 * dot(&p, &d3) / rate.powi(3);
+            Some(Turning { value: sign * value / dot(y, y).sqrt(), refer: vec![1.0] })
+        };
+        [side(1), side(0)]
     }
 
     /// ψ of (3) at uniform times `[M + 1][n]`; `None` if the growth along the orbit needs too many segments.
@@ -137,7 +180,7 @@ impl ConnectingField<'_> {
         }
         let mut row = segments * n;
         for (end, side, first) in [(0, 1.0, 0), (1, -1.0, segments * n)] {
-            let split = self.split(end, parameters)?;
+            let split = self.parts(end, parameters)?;
             let count = if side > 0.0 { split.unstable() } else { n - split.unstable() };
             for own in row_basis(&transposed(&split.projector(side), n), count, n).chunks_exact(n) {
                 matrix.get_mut(row * whole + first..row * whole + first + n)?.copy_from_slice(own);
@@ -188,7 +231,6 @@ impl ConnectingField<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::splitting::times;
     use super::*;
 
     #[test]

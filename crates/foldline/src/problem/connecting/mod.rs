@@ -20,18 +20,38 @@
 //! distance ε_i. (5) fixes both T and the phase. The orbit exists if n_u(x_0) + n_s(x_1) = n, for isolated values of
 //! one parameter.
 //!
-//! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
-//! in this order: T, x_0, x_1 if it is another equilibrium, ε_0, ε_1, g, e_0, e_1, Q_0, Q_1.
+//! An orbit homoclinic to a saddle-node leaves it within the centre-unstable and returns within the centre-stable manifold. With
+//! P_s and P_u for the eigenvalues off the axis, (3) and (4) have n - 1 rows, and the eigenvalue 0 gives the last condition, with
+//! which two parameters are determined but for one:
+//!
+//! ```text
+//!   (6)  tr((1 - P_s - P_u) A_0) = 0
+//! ```
 //!
 //! The tangent spaces deviate from the manifolds by nonlinear terms, r = P (f(x_i + y) - f(x_i) - A_i y) / (rates). They are the
-//! remainders of (3) and (4), from which the error of the truncated orbit follows.
+//! remainders of (3) and (4), from which the error of the truncated orbit follows. Next to a saddle-node the remaining
+//! distance decreases like 1/t only. There (3) and (4) include the terms up to fourth order, with the leading real eigenvalue
+//! κ of the subspace in which the orbit leaves or arrives, the leading one γ of the other, and time derivatives x', x'', x''' of the flow:
 //!
-//! **Source.** beyn1990 (truncation, projection conditions, order of the error); kuznetsov2004, §6.
+//! ```text
+//!   (7)  Q P (24 κ³ (x - x_i) - 26 κ² x' + 9 κ x'' - x''') / ((2 κ - γ) (3 κ - γ) (4 κ - γ)) = 0
+//! ```
+//!
+//! On the manifold, z = h₂ y² + h₃ y³ + … with y ~ exp(κ t). The operator (2 κ - D) (3 κ - D) (4 κ - D), D = d/dt, annihilates three
+//! terms. For κ = 0, y' = b y², and z''' is of fifth order. At the other end of a non-central orbit γ vanishes, and (7) serves there as well. The terms of that order follow from (5 κ - D) applied to (7).
+//!
+//! The state and the time of an orbit are those of the field. T, x_i, the ε_i and the reference are further parameters,
+//! in this order: T, x_0, x_1 if it is another equilibrium, ε_0, ε_1, g, e_0, e_1, Q_0, Q_1 (with a row of zeros for a
+//! saddle-node), the four coefficients of (7) at both ends (1, 0, 0, 0 for the tangent space), and the number of unstable
+//! eigenvalues at x_0. Files of earlier versions end with Q_1.
+//!
+//! **Source.** beyn1990 (truncation, projection conditions, order of the error); kuznetsov2004, §6, §7.1;
+//! champneys1996, §2 (saddle-nodes).
 //!
 //! **Departures.** Two distances in place of a phase condition with a given length; projectors in place of bases of
 //! subspaces that are followed by Riccati equations.
 //!
-//! **Fails when** an eigenvalue of an equilibrium reaches the imaginary axis.
+//! **Fails when** the real parts of eigenvalues on both sides of the projections meet.
 
 mod flips;
 pub mod longer;
@@ -40,14 +60,21 @@ mod splitting;
 mod tests;
 
 use crate::contract::{Batch, Parameters, Turning, VectorField};
-use crate::diagram::Cycle;
-use crate::linalg::{dot, max_abs};
+use crate::diagram::{Cycle, Kind};
+use crate::linalg::{dot, larger, max_abs};
 use crate::stability::eigenvalues;
 use num_complex::Complex64;
-use splitting::{flow, identity, metric, product, row_basis, sign, times, transposed};
+use splitting::{flow, gap, identity, metric, product, row_basis, shifted, sign, times, transposed};
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
+/// Ratio of the rate at which the orbit leaves or arrives to that of the other subspace, or of the other to the former, below which (7)
+/// replaces the tangent space. Elsewhere the tangent space serves at ends that are as close as test functions of flips need them.
+const SLOW: f64 = 0.01;
+/// Coefficients of (7) for the tangent space.
+const TANGENT: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
+/// Further parameters of the reference behind Q: the coefficients of (7), and the number of unstable eigenvalues.
+const FURTHER: usize = 9;
 /// Number of orbits whose flips are kept: those at both ends of a step, and between.
 const KEPT: usize = 4;
 
@@ -60,6 +87,8 @@ pub struct ConnectingField<'a> {
     places: usize,
     /// Dimension of the unstable subspace at the start.
     unstable: usize,
+    /// True for orbits homoclinic to a saddle-node.
+    node: bool,
     determined: Vec<usize>,
     /// The last results of [`VectorField::flips`], with the parameters, which tell one orbit from another.
     turned_last: Mutex<Vec<Turned>>,
@@ -168,22 +197,58 @@ impl<'a> ConnectingField<'a> {
     pub fn new(field: &'a dyn VectorField, scales: &[f64], places: usize, unstable: usize) -> ConnectingField<'a> {
         let (n, k) = (field.dim(), field.parameter_count());
         let determined = (k..k + 1 + places * n).collect();
-        ConnectingField { field, scales: scales.to_vec(), places, unstable, determined, turned_last: Mutex::default() }
+        let turned_last = Mutex::default();
+        ConnectingField { field, scales: scales.to_vec(), places, unstable, node: false, determined, turned_last }
     }
 
-    /// The field of a stored orbit with these parameters; `None` if its equilibrium is not hyperbolic.
+    /// Orbits homoclinic to a saddle-node with `unstable` unstable eigenvalues besides 0.
+    pub fn at_saddle_node(field: &'a dyn VectorField, scales: &[f64], unstable: usize) -> ConnectingField<'a> {
+        ConnectingField { node: true, ..ConnectingField::new(field, scales, 1, unstable) }
+    }
+
+    /// Number of unstable eigenvalues at the start, without the one that vanishes at a saddle-node.
+    pub fn unstable_off_axis(&self) -> usize {
+        self.unstable
+    }
+
+    /// True for orbits homoclinic to a saddle-node.
+    pub fn is_at_saddle_node(&self) -> bool {
+        self.node
+    }
+
+    /// The field of a stored orbit of that kind with these parameters; `None` if they do not belong to one.
     pub fn of_stored(
         field: &'a dyn VectorField,
         scales: &[f64],
-        places: usize,
+        kind: Kind,
         parameters: &[f64],
     ) -> Option<ConnectingField<'a>> {
+        let places = if kind == Kind::Heteroclinic { 2 } else { 1 };
         let own = ConnectingField::new(field, scales, places, 0);
-        if parameters.len() != own.parameter_count() {
-            return None;
+        let unstable = match own.parameter_count().checked_sub(parameters.len())? {
+            0 => *parameters.last()? as usize,
+            FURTHER => own.split(0, parameters)?.unstable(),
+            _ => return None,
+        };
+        Some(ConnectingField { unstable, node: kind == Kind::SaddleNodeHomoclinic, ..own })
+    }
+
+    /// Parameters of an orbit of another kind, to which no reference applies yet.
+    pub fn renewed(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut all = parameters[..parameters.len().saturating_sub(FURTHER)].to_vec();
+        all.resize(self.parameter_count() - 1, 0.0);
+        all.push(self.unstable as f64);
+        all
+    }
+
+    /// Stored parameters, with what files of earlier versions lack.
+    pub fn completed(&self, parameters: &[f64]) -> Vec<f64> {
+        let mut all = parameters.to_vec();
+        if all.len() + FURTHER == self.parameter_count() {
+            all.extend([TANGENT, TANGENT].concat());
+            all.push(self.unstable as f64);
         }
-        let unstable = own.split(0, parameters)?.unstable();
-        Some(ConnectingField { unstable, ..own })
+        all
     }
 
     fn known(&self) -> usize {
@@ -207,8 +272,45 @@ impl<'a> ConnectingField<'a> {
     pub fn parameters(&self, own: &[f64], length: f64, places: &[f64], sizes: [f64; 2], gain: &[f64]) -> Vec<f64> {
         let mut all = [&own[..self.known()], &[length], places, &sizes].concat();
         all.extend((0..self.dim()).map(|c| gain.get(c).copied().unwrap_or(0.0)));
-        all.resize(self.parameter_count(), 0.0);
+        all.resize(self.parameter_count() - 1, 0.0);
+        all.push(self.unstable as f64);
         all
+    }
+
+    /// Coefficients of (7) at an end.
+    fn coefficients(&self, end: usize, parameters: &[f64]) -> [f64; 4] {
+        let first = self.parameter_count() - FURTHER + 4 * end;
+        std::array::from_fn(|k| parameters.get(first + k).copied().unwrap_or(TANGENT[k]))
+    }
+
+    /// True if the orbit leaves or arrives at an end more slowly than deviations decay there.
+    pub fn creeps(&self, end: usize, parameters: &[f64]) -> bool {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let ([other, own], _) = self.rates(end, &self.eigenvalues_of(&at.a));
+        self.node || own < other
+    }
+
+    /// True where (7) will replace the tangent space once an end is placed again.
+    fn will_be_slow(&self, end: usize, parameters: &[f64]) -> bool {
+        let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
+        let ([other, own], real) = self.rates(end, &self.eigenvalues_of(&at.a));
+        self.node || real && is_slow(own, other)
+    }
+
+    /// True where (7) replaces the tangent space at an end.
+    pub fn is_slow(&self, end: usize, parameters: &[f64]) -> bool {
+        self.coefficients(end, parameters)[3] != 0.0
+    }
+
+    /// x', x'', x''' and x'''' of the flow at a state, each `[n]` in units of the sizes of the states.
+    fn motions(&self, x: &[f64], parameters: &[f64]) -> [Vec<f64>; 4] {
+        let at = Jet { field: self, x, parameters: &parameters[..self.known()] };
+        at.motions().map(|v| v.iter().zip(&self.scales).map(|(v, s)| v / s).collect())
+    }
+
+    /// Number of eigenvalues to the left of those that the right one of the two projectors at an end belongs to.
+    fn below(&self, end: usize) -> usize {
+        self.dim() - self.unstable - usize::from(self.node && end == 0)
     }
 
     /// Size of a state.
@@ -251,11 +353,42 @@ impl<'a> ConnectingField<'a> {
 
     /// Stable and unstable parts at the equilibrium of an end; `None` next to a bifurcation of it.
     pub fn split(&self, end: usize, parameters: &[f64]) -> Option<Split> {
+        self.split_at(end, parameters, 0.0)
+    }
+
+    /// The part in which the orbit leaves or arrives, and the other one, at the equilibrium of an end. Unlike with
+    /// [`ConnectingField::split`] eigenvalues are divided by their number, also next to a bifurcation.
+    pub fn parts(&self, end: usize, parameters: &[f64]) -> Option<Split> {
+        let a = self.saddle(&parameters[self.place(end)], parameters, &[]).a;
+        self.split_at(end, parameters, gap(&self.eigenvalues_of(&a), self.below(end))?)
+    }
+
+    fn split_at(&self, end: usize, parameters: &[f64], shift: f64) -> Option<Split> {
         let a = self.saddle(&parameters[self.place(end)], parameters, &[]).a;
         let n = self.dim();
-        let (s, _) = sign(&a, &[], n)?;
-        let h = metric(&a, &s, n)?;
+        let moved = shifted(&a, shift, n);
+        let (s, _) = sign(&moved, &[], n)?;
+        let h = metric(&moved, &s, n)?;
         Some(Split { a, s, h, n })
+    }
+
+    /// Eigenvalues of a matrix in units of the sizes of the states, by growing real part.
+    fn eigenvalues_of(&self, a: &[f64]) -> Vec<Complex64> {
+        let mut values = eigenvalues(a, self.dim(), &vec![1.0; self.dim()]);
+        values.sort_by(|a, b| a.re.total_cmp(&b.re));
+        values
+    }
+
+    /// Distances from the axis of the leading eigenvalues of the subspace that the orbit must not enter at an end, and of the one in
+    /// which it leaves or arrives; the latter may be negative next to a bifurcation. True if it is real.
+    fn rates(&self, end: usize, values: &[Complex64]) -> ([f64; 2], bool) {
+        let (left, right) = values.split_at(self.below(end));
+        let near = |z: Option<&Complex64>, side: f64| z.map_or(f64::INFINITY, |z| side * z.re);
+        let both = [near(left.last(), -1.0), near(right.first(), 1.0)];
+        match end {
+            0 => (both, right.first().is_some_and(|z| z.im == 0.0)),
+            _ => ([both[1], both[0]], left.last().is_some_and(|z| z.im == 0.0)),
+        }
     }
 
     fn saddle(&self, state: &[f64], parameters: &[f64], free: &[usize]) -> Saddle {
@@ -286,18 +419,29 @@ impl<'a> ConnectingField<'a> {
         out
     }
 
+    /// True if the orbit is subject to conditions (3) or (4) at an end.
+    pub fn is_bound(&self, end: usize) -> bool {
+        !self.row_ranges()[end].is_empty()
+    }
+
     /// Ranges of Q_0 and Q_1 among the parameters.
     fn row_ranges(&self) -> [Range<usize>; 2] {
         let n = self.dim();
         let first = self.hidden() + 2 + 3 * n;
-        let middle = first + (n - self.unstable) * n;
-        [first..middle, middle..first + n * n]
+        let middle = first + self.below(0) * n;
+        [first..middle, middle..middle + (n - self.below(1)) * n]
     }
 
     /// Range of e at an end.
     fn plane(&self, end: usize) -> Range<usize> {
         let first = self.hidden() + 2 + (1 + end) * self.dim();
         first..first + self.dim()
+    }
+
+    /// Reciprocal rate of the subspaces off the axis at a saddle-node, constant between references: (6) has no unit.
+    fn unit_of_rates(&self, parameters: &[f64]) -> f64 {
+        let all = [0, 1].map(|end| self.coefficients(end, parameters)[3].abs().cbrt());
+        if larger(all[0], all[1]) > 0.0 { larger(all[0], all[1]) } else { 1.0 }
     }
 
     fn base<'b>(&self, at: Batch<'b>) -> (Batch<'b>, Vec<f64>) {
@@ -312,6 +456,71 @@ impl<'a> ConnectingField<'a> {
     }
 }
 
+/// True if (7) is to replace the tangent space, by the distances from the axis of the leading eigenvalue of the subspace in which the
+/// orbit leaves or arrives, which is real, and of the other one.
+fn is_slow(own: f64, other: f64) -> bool {
+    own < SLOW * other || other < SLOW * own
+}
+
+/// Time derivatives of the flow at a state.
+struct Jet<'j> {
+    field: &'j ConnectingField<'j>,
+    x: &'j [f64],
+    parameters: &'j [f64],
+}
+
+impl Jet<'_> {
+    /// Derivative of f along directions in the states `[n]`, or in states and parameters `[n + k]`.
+    fn along(&self, directions: &[&[f64]]) -> Vec<f64> {
+        let size = self.x.len() + self.parameters.len();
+        let padded: Vec<Vec<f64>> =
+            directions.iter().map(|d| d.iter().copied().chain(std::iter::repeat(0.0)).take(size).collect()).collect();
+        let padded: Vec<&[f64]> = padded.iter().map(Vec::as_slice).collect();
+        let mut out = vec![0.0; self.x.len()];
+        self.field.field.directional(self.batch(), &padded, &mut out);
+        out
+    }
+
+    fn batch(&self) -> Batch<'_> {
+        let parameters = Parameters::Shared(self.parameters);
+        Batch { lanes: 1, states: self.x, parameters, times: &[], signs: &[] }
+    }
+
+    /// x' to x'''', `[n]` each.
+    fn motions(&self) -> [Vec<f64>; 4] {
+        let mut f = vec![0.0; self.x.len()];
+        self.field.field.evaluate(self.batch(), &mut f);
+        let second = self.along(&[&f]);
+        let third = sum(&[(1.0, &self.along(&[&f, &f])), (1.0, &self.along(&[&second]))]);
+        let fourth = sum(&[
+            (1.0, &self.along(&[&f, &f, &f])),
+            (3.0, &self.along(&[&f, &second])),
+            (1.0, &self.along(&[&third])),
+        ]);
+        [f, second, third, fourth]
+    }
+
+    /// Changes of x', x'' and x''' along a direction `d` in states and parameters `[n + k]`.
+    fn changes(&self, [f, second, _, _]: &[Vec<f64>; 4], d: &[f64]) -> [Vec<f64>; 3] {
+        let a = self.along(&[d]);
+        let b = sum(&[(1.0, &self.along(&[d, f])), (1.0, &self.along(&[&a]))]);
+        let c = sum(&[
+            (1.0, &self.along(&[d, f, f])),
+            (2.0, &self.along(&[f, &a])),
+            (1.0, &self.along(&[d, second])),
+            (1.0, &self.along(&[&b])),
+        ]);
+        [a, b, c]
+    }
+}
+
+/// Sum of vectors with factors.
+fn sum(terms: &[(f64, &[f64])]) -> Vec<f64> {
+    let mut out = vec![0.0; terms[0].1.len()];
+    terms.iter().for_each(|(factor, x)| out.iter_mut().zip(*x).for_each(|(o, x)| *o += factor * x));
+    out
+}
+
 impl VectorField for ConnectingField<'_> {
     fn dim(&self) -> usize {
         self.field.dim()
@@ -319,7 +528,7 @@ impl VectorField for ConnectingField<'_> {
 
     fn parameter_count(&self) -> usize {
         let n = self.dim();
-        self.hidden() + 2 + 3 * n + n * n
+        self.hidden() + 2 + 3 * n + n * n + FURTHER
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {
@@ -429,6 +638,7 @@ impl VectorField for ConnectingField<'_> {
         let ys = self.deviations(ends, parameters);
         let ranges = self.row_ranges();
         let mut row = self.places * n;
+        let mut signs: Vec<Vec<f64>> = Vec::new();
         for end in 0..2 {
             let place = self.place(end);
             let at = self.saddle(&parameters[place.clone()], parameters, &known);
@@ -448,7 +658,7 @@ impl VectorField for ConnectingField<'_> {
                     }
                 }
             }
-            // (3), (4)
+            // (3), (4), (7)
             let moves: Vec<usize> = (0..q).filter(|c| column(*c).is_some() || place.contains(&free[*c])).collect();
             let turns: Vec<Vec<f64>> = moves
                 .iter()
@@ -461,7 +671,8 @@ impl VectorField for ConnectingField<'_> {
                     self.turned(&at, parameters, &d)
                 })
                 .collect();
-            let Some((s, along)) = sign(&at.a, &turns, n) else {
+            let shift = gap(&self.eigenvalues_of(&at.a), self.below(end));
+            let Some((s, along)) = shift.and_then(|shift| sign(&shifted(&at.a, shift, n), &turns, n)) else {
                 b.fill(f64::NAN);
                 return;
             };
@@ -470,29 +681,68 @@ impl VectorField for ConnectingField<'_> {
             let rows = &parameters[ranges[end].clone()];
             let projector: Vec<f64> = identity(n).iter().zip(&s).map(|(i, s)| 0.5 * (i + side * s)).collect();
             let (own, y) = (product(rows, &projector, n), &ys[end]);
-            let varied: Vec<Vec<f64>> =
-                along.iter().map(|ds| times(rows, &times(ds, y)).iter().map(|x| 0.5 * side * x).collect()).collect();
-            let mut put = |values: &[f64], place: &Range<usize>, offset: f64, varied: &[f64]| {
-                let ends = if end == 0 { &mut *left } else { &mut *right };
-                b[row] = dot(values, y) - offset;
-                for j in 0..n {
-                    ends[row * n + j] = values[j] / self.scales[j];
-                }
-                for (c, index) in free.iter().enumerate() {
-                    if place.contains(index) {
-                        let j = index - place.start;
-                        by[row * q + c] = -values[j] / self.scales[j];
-                    }
-                }
-                moves.iter().zip(varied).for_each(|(c, v)| by[row * q + c] += v);
-                row += 1;
+            let [linear, bent @ ..] = self.coefficients(end, parameters);
+            let mut subject: Vec<f64> = y.iter().map(|y| linear * y).collect();
+            // The terms of (7) beyond the first, with their derivatives in the states and in the free parameters of the field.
+            let mut further: Option<[Vec<Vec<f64>>; 2]> = None;
+            if self.is_slow(end, parameters) && !rows.is_empty() {
+                let jet = Jet { field: self, x: ends[end], parameters: &parameters[..k] };
+                let motions = jet.motions();
+                let added = |all: &[Vec<f64>]| -> Vec<f64> {
+                    let one = |c: usize| bent.iter().zip(all).map(|(b, own)| b * own[c]).sum::<f64>() / self.scales[c];
+                    (0..n).map(one).collect()
+                };
+                subject.iter_mut().zip(added(&motions)).for_each(|(x, f)| *x += f);
+                let along = |index: usize| -> Vec<f64> {
+                    let mut d = vec![0.0; n + k];
+                    d[index] = 1.0;
+                    added(&jet.changes(&motions, &d))
+                };
+                further = Some([(0..n).map(along).collect(), known.iter().map(|index| along(n + index)).collect()]);
+            }
+            let turned_by = |ds: &Vec<f64>| -> Vec<f64> {
+                times(rows, &times(ds, &subject)).iter().map(|x| 0.5 * side * x).collect()
             };
+            let varied: Vec<Vec<f64>> = along.iter().map(turned_by).collect();
+            let own_value = |values: &[f64]| dot(values, &subject);
+            let mut put =
+                |values: &[f64], factor: f64, there: Option<&[Vec<Vec<f64>>; 2]>, value: f64, varied: &[f64]| {
+                    let ends = if end == 0 { &mut *left } else { &mut *right };
+                    b[row] = value;
+                    for j in 0..n {
+                        ends[row * n + j] = factor * values[j] / self.scales[j];
+                    }
+                    for (c, index) in free.iter().enumerate() {
+                        if place.contains(index) {
+                            let j = index - place.start;
+                            by[row * q + c] = -factor * values[j] / self.scales[j];
+                        }
+                    }
+                    if let Some([in_states, in_parameters]) = there {
+                        in_states.iter().enumerate().for_each(|(j, slope)| ends[row * n + j] += dot(values, slope));
+                        for (c, own) in (0..q).filter_map(|c| Some((c, column(c)?))) {
+                            by[row * q + c] += dot(values, &in_parameters[own]);
+                        }
+                    }
+                    moves.iter().zip(varied).for_each(|(c, v)| by[row * q + c] += v);
+                    row += 1;
+                };
             for (r, values) in own.chunks_exact(n).enumerate() {
                 let varied: Vec<f64> = varied.iter().map(|v| v[r]).collect();
-                put(values, &place, 0.0, &varied);
+                put(values, linear, further.as_ref(), own_value(values), &varied);
             }
             // (5)
-            put(&parameters[self.plane(end)], &place, self.sizes(parameters)[end], &[]);
+            let plane = &parameters[self.plane(end)];
+            put(plane, 1.0, None, dot(plane, y) - self.sizes(parameters)[end], &[]);
+            // (6), twice the projector of the eigenvalue 0 being the difference of the sign functions.
+            signs.push(s);
+            if let ([first, second], true) = (&signs[..], self.node) {
+                let centre: Vec<f64> = first.iter().zip(second).map(|(a, b)| 0.5 * (a - b)).collect();
+                let against = |m: &[f64]| dot(&transposed(&centre, n), m);
+                let unit = self.unit_of_rates(parameters);
+                b[row] = unit * against(&at.a);
+                moves.iter().zip(&turns).for_each(|(c, turned)| by[row * q + c] = unit * against(turned));
+            }
         }
     }
 
@@ -500,7 +750,7 @@ impl VectorField for ConnectingField<'_> {
         let ys = self.deviations(ends, parameters);
         let (n, ranges) = (self.dim(), self.row_ranges());
         for (end, y) in ys.iter().enumerate() {
-            let Some(split) = self.split(end, parameters) else { return };
+            let Some(split) = self.parts(end, parameters) else { return };
             let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
             // Blind to the other subspace, so that what the conditions neglect does not shift the phase.
             let own = split.covector_of(&split.part(y, kept));
@@ -516,6 +766,24 @@ impl VectorField for ConnectingField<'_> {
             parameters[hidden + end] = length;
             let rows = ranges[end].len() / n;
             parameters[ranges[end].clone()].copy_from_slice(&row_basis(&split.projector(gone), rows, n));
+            let ([other, own], real) = self.rates(end, &self.eigenvalues_of(&split.a));
+            // Between references the conditions remain of one kind: the ends were placed for it.
+            let known = self.coefficients(end, parameters);
+            let slow = self.node || real && if known == [0.0; 4] { is_slow(own, other) } else { known[3] != 0.0 };
+            let own = if self.node { 0.0 } else { own };
+            let first = self.parameter_count() - FURTHER + 4 * end;
+            let coefficients = match slow && other.is_finite() {
+                true => {
+                    // κ and γ have opposite signs.
+                    let (kappa, gamma) = (-gone * own, gone * other);
+                    let rates: f64 = [2.0, 3.0, 4.0].iter().map(|k| k * kappa - gamma).product();
+                    [24.0 * kappa.powi(3), -26.0 * kappa.powi(2), 9.0 * kappa, -1.0].map(|c| c / rates)
+                }
+                false => TANGENT,
+            };
+            if let Some(to) = parameters.get_mut(first..first + 4) {
+                to.copy_from_slice(&coefficients);
+            }
         }
     }
 
@@ -523,22 +791,37 @@ impl VectorField for ConnectingField<'_> {
         let (n, ranges) = (self.dim(), self.row_ranges());
         let mut all = vec![0.0; self.places * n];
         for (end, y) in self.deviations(ends, parameters).iter().enumerate() {
-            let Some(split) = self.split(end, parameters) else { return vec![f64::NAN; self.conditions()[0]] };
+            let Some(split) = self.parts(end, parameters) else { return vec![f64::NAN; self.conditions()[0]] };
             let at = self.saddle(&parameters[self.place(end)], parameters, &[]);
             let there: Vec<f64> = (0..n).map(|c| at.state[c] + y[c] * self.scales[c]).collect();
-            let beyond = self.saddle(&there, parameters, &[]).f;
-            // All that the linear flow neglects, of any order: the second may vanish by symmetry.
-            let linear = times(&at.a, y);
-            let neglected: Vec<f64> = (0..n).map(|c| beyond[c] - at.f[c] - linear[c]).collect();
-            let values = eigenvalues(&at.a, n, &vec![1.0; n]);
-            let rate = |sign: f64| {
-                let own = values.iter().map(|z| sign * z.re).filter(|x| *x > 0.0);
-                own.fold(f64::INFINITY, f64::min)
-            };
-            let (gone, kept) = if end == 0 { (-1.0, 1.0) } else { (1.0, -1.0) };
-            let rates = rate(gone) + 2.0 * rate(kept);
+            let beyond = self.saddle(&there, parameters, &[]);
+            let gone = if end == 0 { -1.0 } else { 1.0 };
+            let ([other, kept], _) = self.rates(end, &self.eigenvalues_of(&at.a));
             let own = product(&parameters[ranges[end].clone()], &split.projector(gone), n);
+            let coefficients = self.coefficients(end, parameters);
+            let (neglected, rates): (Vec<f64>, f64) = if !self.is_slow(end, parameters) {
+                // All that the linear flow neglects, of any order: the second may vanish by symmetry.
+                let along = times(&at.a, y);
+                let neglected = (0..n).map(|c| beyond.f[c] - at.f[c] - along[c]).collect();
+                (neglected, other + 2.0 * kept)
+            } else {
+                let kept = if self.node { 0.0 } else { kept };
+                let kappa = -gone * kept;
+                let [d1, d2, d3, d4] = self.motions(ends[end], parameters);
+                let all = [y, &d1, &d2, &d3, &d4];
+                let one = |c: usize| -> f64 {
+                    coefficients
+                        .iter()
+                        .enumerate()
+                        .map(|(k, own)| own * (5.0 * kappa * all[k][c] - all[k + 1][c]))
+                        .sum()
+                };
+                ((0..n).map(one).collect(), other + 5.0 * kept)
+            };
             all.extend(times(&own, &neglected).iter().map(|r| r / rates));
+            all.push(0.0);
+        }
+        if self.node {
             all.push(0.0);
         }
         all
@@ -557,7 +840,7 @@ impl VectorField for ConnectingField<'_> {
     }
 
     fn lengthened(&self, orbit: &Cycle, parameters: &[f64], share: f64) -> Option<(Cycle, Vec<f64>)> {
-        longer::longer(self, orbit, parameters, share)
+        longer::resized(self, orbit, parameters, share)
     }
 
     fn saddles(&self, parameters: &[f64]) -> Option<[Vec<Complex64>; 2]> {

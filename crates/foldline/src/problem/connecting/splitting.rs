@@ -16,16 +16,43 @@
 //! S A has eigenvalues with positive real parts, so H is positive definite, and |y|² = yᵀ H y grows along the unstable
 //! and decreases along the stable subspace.
 //!
+//! Next to a bifurcation the eigenvalues are divided by their number instead. The sign function of A + σ is that of A if no eigenvalue lies between -σ
+//! and 0, and so are the projectors; with σ in the middle of a gap they are smooth where an eigenvalue crosses the axis.
+//!
 //! **Source.** higham2008, §5.3 (Newton's iteration, scaling by determinants), §3.2 (derivatives).
 //!
 //! **Fails when** an eigenvalue is too close to the imaginary axis.
 
 use crate::linalg::{dot, lu, max_abs};
+use num_complex::Complex64;
 
 /// Largest number of iterations (1). With the scaling, a dozen suffice for eigenvalues whose sizes span ten decades.
 const ITERATIONS: usize = 60;
 /// Relative change of S at which (1) has converged: the next one is of the order of its square.
 const CONVERGED: f64 = 1e-9;
+
+/// Half the distance between the real parts of the `below` leftmost eigenvalues and of the others, relative to which an eigenvalue is
+/// close to the axis: the sign function is then taken of a shifted matrix.
+const CLOSE: f64 = 0.05;
+
+/// Shift of a matrix that moves the imaginary axis between the `below` leftmost of its eigenvalues, ordered by their real parts, and
+/// the others; 0 if it lies there. `None` if both have the same real part.
+pub(super) fn gap(values: &[Complex64], below: usize) -> Option<f64> {
+    const APART: f64 = 1e-12;
+    let size = values.iter().fold(f64::MIN_POSITIVE, |m, z| m.max(z.norm()));
+    let left = below.checked_sub(1).map_or(-2.0 * size, |k| values[k].re);
+    let right = values.get(below).map_or(2.0 * size, |z| z.re);
+    if right - left < APART * size {
+        return None;
+    }
+    let near = CLOSE * (right - left);
+    Some(if left < -near && right > near { 0.0 } else { -0.5 * (left + right) })
+}
+
+/// A matrix `[n × n]` plus a multiple of the identity.
+pub(super) fn shifted(a: &[f64], shift: f64, n: usize) -> Vec<f64> {
+    (0..n * n).map(|k| if k / n == k % n { a[k] + shift } else { a[k] }).collect()
+}
 
 /// The sign function of a matrix `[n × n]` and its derivatives; `None` if (1) does not converge.
 pub(super) fn sign(a: &[f64], directions: &[Vec<f64>], n: usize) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {

@@ -27,12 +27,19 @@ fn conditions(field: &ConnectingField, ends: [&[f64]; 2], parameters: &[f64], fr
 #[test]
 fn the_derivatives_of_the_conditions_are_those_of_differences() {
     let model = lorenz();
-    let field = ConnectingField::new(&model, &[2.0, 3.0, 5.0], 1, 1);
+    let scales = [2.0, 3.0, 5.0];
+    have_exact_derivatives(&ConnectingField::new(&model, &scales, 1, 1), false);
+    // The conditions do not depend on whether an eigenvalue is 0.
+    have_exact_derivatives(&ConnectingField::at_saddle_node(&model, &scales, 0), true);
+}
+
+fn have_exact_derivatives(field: &ConnectingField, slow: bool) {
     let ends = [vec![0.011, 0.022, 0.001], vec![0.004, -0.003, 0.03]];
     let mut parameters = field.parameters(&[14.0, 10.0, 2.7], 4.0, &[0.002, -0.001, 0.003], [0.01, 0.01], &[]);
     field.refer([&ends[0], &ends[1]], &mut parameters);
+    assert_eq!(field.is_slow(0, &parameters), slow);
     let free = [3, 4, 5, 6, 1, 0];
-    let [value, left, right, by] = conditions(&field, [&ends[0], &ends[1]], &parameters, &free);
+    let [value, left, right, by] = conditions(field, [&ends[0], &ends[1]], &parameters, &free);
     assert!(value.iter().all(|v| v.is_finite()));
     let h = 1e-6;
     let check = |moved: &dyn Fn(f64) -> Vec<f64>, own: &dyn Fn(usize) -> f64| {
@@ -46,7 +53,7 @@ fn the_derivatives_of_the_conditions_are_those_of_differences() {
             let moved = |h: f64| {
                 let mut ends = ends.clone();
                 ends[end][j] += h;
-                conditions(&field, [&ends[0], &ends[1]], &parameters, &free)[0].clone()
+                conditions(field, [&ends[0], &ends[1]], &parameters, &free)[0].clone()
             };
             check(&moved, &|row| matrix[row * 3 + j]);
         }
@@ -55,10 +62,36 @@ fn the_derivatives_of_the_conditions_are_those_of_differences() {
         let moved = |h: f64| {
             let mut parameters = parameters.clone();
             parameters[*index] += h;
-            conditions(&field, [&ends[0], &ends[1]], &parameters, &free)[0].clone()
+            conditions(field, [&ends[0], &ends[1]], &parameters, &free)[0].clone()
         };
         check(&moved, &|row| by[row * free.len() + c]);
     }
+}
+
+/// y' = y², z' = -z + y² + 2 y³ has the manifold z = y².
+#[test]
+fn the_conditions_next_to_a_saddle_node_find_its_manifold_to_fourth_order() {
+    let model = Model::compile(ModelSource {
+        name: "slow".into(),
+        parameters: vec![Parameter::new("p", 0.0)],
+        states: ["y", "z"].map(State::new).to_vec(),
+        equations: vec![Definition::new("y", "p + y^2"), Definition::new("z", "-z + y^2 + 2*y^3")],
+        ..ModelSource::default()
+    })
+    .unwrap();
+    let field = ConnectingField::at_saddle_node(&model, &[1.0, 1.0], 0);
+    let residual = |y: f64, z: f64| {
+        let ends = [vec![y, z], vec![-0.02, 0.0004]];
+        let mut parameters = field.parameters(&[0.0], 100.0, &[0.0, 0.0], [0.02, 0.02], &[]);
+        field.refer([&ends[0], &ends[1]], &mut parameters);
+        conditions(&field, [&ends[0], &ends[1]], &parameters, &[])[0][2].abs()
+    };
+    // The third derivative of z = y² in time is 24 y⁵.
+    for y in [0.02, 0.01] {
+        let off = residual(y, y * y);
+        assert!((off / (24.0 * y.powi(5)) - 1.0).abs() < 1e-6, "{off:e}");
+    }
+    assert!((residual(0.02, 0.0004 + 1e-3) / 1e-3 - 1.0).abs() < 0.2);
 }
 
 #[test]

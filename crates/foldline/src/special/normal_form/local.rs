@@ -25,11 +25,11 @@ pub fn overlap(a: &[f64], b: &[f64]) -> f64 {
 /// Equilibrium and the derivatives of f there.
 pub struct Local<'a> {
     field: &'a dyn VectorField,
-    state: &'a [f64],
-    parameters: &'a [f64],
+    pub(super) state: &'a [f64],
+    pub(super) parameters: &'a [f64],
     pub(super) n: usize,
     /// `[n × n]`.
-    jacobian: Vec<f64>,
+    pub(super) jacobian: Vec<f64>,
     /// `[n]` units in which the states are measured; empty for those of the model.
     units: Vec<f64>,
     /// `[n]` sizes of the states, in terms of which null vectors are computed; empty if they are 1.

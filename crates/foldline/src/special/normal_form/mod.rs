@@ -36,6 +36,7 @@
 //! |---|---|
 //! | derivatives of f, critical eigenvectors | `local` |
 //! | motion on the centre manifold | `manifold` |
+//! | homoclinic orbits next to (7) | `loops` |
 //! | (1), (2), (3), (6), (7) | `zero` |
 //! | (4), (5), (8) | `oscillating` |
 //! | errors of all of them | `errors` |
@@ -47,6 +48,7 @@
 
 mod errors;
 mod local;
+mod loops;
 mod manifold;
 mod oscillating;
 #[cfg(test)]
@@ -55,6 +57,7 @@ mod units;
 mod zero;
 
 pub use local::{ALIGNED, Local, SHIFTS, overlap};
+pub use loops::Loops;
 pub use units::units;
 
 use super::coefficients::Coefficients;
