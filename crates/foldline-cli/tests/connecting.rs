@@ -507,7 +507,7 @@ fn starts_that_do_not_exist_on_a_curve_are_refused_with_the_reason() {
     let three = BOGDANOV_TAKENS.replace("b2 = 0.05", "b2 = 0.05\nc = 1");
     for (from, to, words) in [
         ("of = \"folds\"\nfree = \"b2\"", "of = \"folds\"\nfree = \"c\"", "lies in the plane of b1 and b2"),
-        ("hold = \"homoclinic\"\nof = \"folds\"", "hold = \"hopf\"\nof = \"folds\"", "is a curve, but"),
+        ("hold = \"homoclinic\"\nof = \"folds\"", "hold = \"hopf\"\nof = \"folds\"", "is a curve, and"),
     ] {
         let folder = desk_of(&three, &study.replace(from, to));
         let output = foldline(folder.path(), &["run", "s.toml", "--out", "run"]);

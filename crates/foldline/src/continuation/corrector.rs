@@ -420,9 +420,7 @@ pub fn refine(
         }
         let within = |distance: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < distance);
         let close = |defect: f64| within(CERTAIN * defect);
-        // An error that could not be estimated may be a profile that is not resolved.
-        let unknown = found.point.trust.spectrum.is_nan() && problem.has_multipliers();
-        let certain = !(again && (close(defect) || within(found.point.trust.spectrum) || accurate && unknown));
+        let certain = !(again && (close(defect) || within(found.point.trust.spectrum)));
         if accurate && certain {
             if trust.discretisation > RESOLVED * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));

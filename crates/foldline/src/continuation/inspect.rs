@@ -187,7 +187,9 @@ impl Follow<'_> {
                 && found.as_ref().is_ok_and(|found| {
                     // In a symmetric model the symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
-                        || !self.settings.is_symmetric() && self.is_vertex(&stretch, found.distance, cost)
+                        || !self.settings.is_symmetric()
+                            && !self.passes_critical(left, right)
+                            && self.is_vertex(&stretch, found.distance, cost)
                 })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
@@ -751,7 +753,8 @@ impl Follow<'_> {
             let slope = after - bend * length;
             let at = -slope / (2.0 * bend);
             let value = b + at * (slope + bend * at);
-            if bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1 {
+            let near = if crossing() { 0.0 } else { 0.1 };
+            if bend * b > 0.0 && at > 0.0 && at < length && value / b < near {
                 let place = (PLACES * at / length).round().clamp(1.0, PLACES - 1.0);
                 return Some(place * length / PLACES);
             }

@@ -229,6 +229,7 @@ impl Follow<'_> {
             let found = self.unrefined(left, u.clone(), close, cost)?;
             // A mesh that no longer resolves the profile is worse than a change of mesh.
             let coarse = found.point.trust.discretisation > RESOLVED * self.settings.tolerance;
+            let coarse = coarse && !self.problem.is_switched();
             on_its_mesh = Some(found).filter(|_| !coarse);
         }
         let forced = rigid && short && on_its_mesh.is_none();

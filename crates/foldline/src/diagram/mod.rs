@@ -997,6 +997,8 @@ impl Branch {
         let same = |other: &&SpecialPoint| {
             other.kind == special.kind
                 && other.point.parameters == special.point.parameters
+                // Images under a symmetry may have the same parameters to the last digit.
+                && other.point.ranges == special.point.ranges
                 && !std::ptr::eq(*other, special)
         };
         let own = self.special.iter().position(|other| std::ptr::eq(other, special));
@@ -1009,8 +1011,11 @@ impl Branch {
     /// Number of special points of the same kind at exactly the same point, this one included: eigenvalues or multipliers
     /// that cross simultaneously.
     pub fn together_with(&self, special: &SpecialPoint) -> usize {
-        let same =
-            |other: &&SpecialPoint| other.kind == special.kind && other.point.parameters == special.point.parameters;
+        let same = |other: &&SpecialPoint| {
+            other.kind == special.kind
+                && other.point.parameters == special.point.parameters
+                && other.point.ranges == special.point.ranges
+        };
         self.special.iter().filter(same).count().max(1)
     }
 

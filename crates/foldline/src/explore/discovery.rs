@@ -31,13 +31,14 @@ use crate::attractors::spectral_ratio;
 use crate::contract::Event;
 use crate::diagram::{Branch, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use crate::special::mark::Mark;
+use crate::special::normal_form::units;
 use crate::special::quantity::Quantity;
 
 /// Carries out an exploration. Returns false if the observer wants to stop.
 pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {
     work.budget = plan.budget;
     let lookout = Lookout::new(work.system, plan, work.plan.tolerance);
-    let mut discovery = Discovery { work, plan, named: Vec::new(), unsettled: 0 };
+    let mut discovery = Discovery { work, plan, named: Vec::new(), unsettled: 0, singular: Vec::new() };
     // While this thread follows the solutions found at one value, others scan the next values.
     let sampled = std::thread::scope(|scope| {
         (1..jobs.min(plan.values)).for_each(|_| drop(scope.spawn(|| while lookout.look() {})));
@@ -46,6 +47,7 @@ pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool 
         going
     });
     let going = sampled
+        && discovery.postponed()
         && discovery.resonant()
         && plan.connect.is_none_or(|(second, range)| discovery.connected(second, range));
     going && discovery.told()
@@ -58,7 +60,16 @@ struct Discovery<'d, 'w> {
     named: Vec<String>,
     /// Number of values at which some samples did not settle.
     unsettled: usize,
+    /// Equilibria at a bifurcation, which wait for the branches found elsewhere.
+    singular: Vec<(Point, Origin)>,
 }
+
+/// Smallest eigenvalue of an equilibrium, in rates of change near it, below which it may be a multiple one: the square root
+/// of the accuracy to which Newton's method finds a double solution.
+const SINGULAR: f64 = 1e-4;
+/// Distance from such an equilibrium, in the range of the parameter and in sizes of the states, within which a special point of
+/// a branch explains it. Empirical: far above the errors of both, far below the distances of branches.
+const BESIDE: f64 = 1e-2;
 
 impl Discovery<'_, '_> {
     /// Carries out steps 2 and 3 at one of the values.
@@ -73,7 +84,38 @@ impl Discovery<'_, '_> {
             Err(why) => return self.short(&format!("no branch can start at {}: {why}", Shown(value))),
         };
         let origin = Origin::Seed(format!("{}, at {}", self.plan.name, Shown(value)));
-        self.note(&said) && found.into_iter().all(|point| self.followed(point, origin.clone()))
+        self.note(&said)
+            && found.into_iter().all(|point| match self.is_singular(&point) {
+                true => {
+                    self.singular.push((point, origin.clone()));
+                    true
+                }
+                false => self.followed(point, origin.clone()),
+            })
+    }
+
+    /// True for an equilibrium with an eigenvalue that is 0 within the accuracy of a multiple solution, as where one of the
+    /// values is that of a bifurcation. From there, the two sides of a branch can belong to different ones.
+    fn is_singular(&self, point: &Point) -> bool {
+        let Solution::Equilibrium(state) = &point.solution else { return false };
+        let system = self.work.system;
+        let sizes: Vec<f64> = state.iter().zip(&system.scales).map(|(x, s)| x.abs() + s).collect();
+        let (_, rate) = units(system.field, state, &point.parameters, &sizes);
+        point.spectrum.iter().any(|z| z.norm() < SINGULAR * rate)
+    }
+
+    /// Follows the equilibria at a bifurcation that no special point of a branch explains.
+    fn postponed(&mut self) -> bool {
+        let (free, width) = (self.plan.free, self.plan.range[1] - self.plan.range[0]);
+        std::mem::take(&mut self.singular).into_iter().all(|(point, origin)| {
+            let measure = self.work.system.measure();
+            let beside = |special: &SpecialPoint| {
+                (special.point.parameters[free] - point.parameters[free]).abs() <= BESIDE * width
+                    && special.point.distance(&point, measure) <= BESIDE
+            };
+            let explained = self.work.branches.iter().any(|own| own.free == free && own.special.iter().any(&beside));
+            explained || self.followed(point, origin)
+        })
     }
 
     /// Step 3: follows a new branch from a solution, unless it lies on a known one.

@@ -141,11 +141,10 @@ const TURN: f64 = 2.0;
 /// … and slack on top, in radians: what the tangent of a straight branch turns by errors, with a wide margin.
 const SLACK: f64 = 0.05;
 
-/// True if the parameter changes equally fast along the branches of two solutions that may be the same, in any phase and
-/// under any symmetry. Next to a pitchfork solutions of both branches differ little in their ranges.
-fn slopes_agree(a: &Point, b: &Point) -> bool {
-    let known = |point: &Point| !point.tangent.is_empty();
-    !(known(a) && known(b)) || (a.parameter_slope().abs() - b.parameter_slope().abs()).abs() <= APART
+/// True if the parameter changes as fast along the branch of a solution as at another one that may be the same, in any
+/// phase and under any symmetry. Next to a pitchfork solutions of both branches differ little in their ranges.
+fn slopes_agree(slope: f64, found: &Point) -> bool {
+    found.tangent.is_empty() || (slope.abs() - found.parameter_slope().abs()).abs() <= APART
 }
 
 /// Difference of the slopes of the parameter beyond which two solutions lie on different branches: that of directions
@@ -185,6 +184,13 @@ pub fn branch_of<'b>(
     let value = *point.parameters.get(free)?;
     // The size of an angle, and with it the slope, depends on its copy.
     let angles = system.field.periods().iter().any(|period| period.is_finite());
+    // The tangent of the point need not be that along the parameter in question.
+    let measured = || {
+        let mut problem = problem_of(system, free, degree, point, false);
+        let own = polished(&mut *problem, settings, point).ok()?;
+        Some(own.point.parameter_slope())
+    };
+    let slope: std::cell::OnceCell<Option<f64>> = std::cell::OnceCell::new();
     let found = branches.iter().filter(|b| b.free == free && b.held.is_none()).find(|branch| {
         track(branch).windows(2).any(|pair| {
             let (a, b) = (pair[0].parameters[free], pair[1].parameters[free]);
@@ -223,7 +229,7 @@ pub fn branch_of<'b>(
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
                 close(once.as_ref().unwrap_or(found), WITHIN * settings.tolerance)
                     && turn(problem, &guess, found).is_none_or(|own| own <= most)
-                    && (turns > 1.0 || angles || slopes_agree(point, found))
+                    && (turns > 1.0 || angles || slope.get_or_init(measured).is_none_or(|own| slopes_agree(own, found)))
             };
             let near = polished(&mut *problem, settings, &guess);
             if near.is_ok_and(|found| same(&mut *problem, &found.point)) {

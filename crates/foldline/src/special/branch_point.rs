@@ -134,7 +134,7 @@ pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimensi
 
 /// Share of the square of a vector that must be left without its component along the parameter, for the next iteration to
 /// start from it.
-const LEFT: f64 = 1e-2;
+const LEFT: f64 = 1e-8;
 
 /// The vectors of [`kernel`], from the last factorisation.
 fn null_vectors(problem: &mut dyn ZeroProblem, tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {

@@ -56,7 +56,9 @@ impl CycleProblem<'_> {
     /// Mesh for a tolerance at `u`, from the errors on the current one.
     pub(super) fn equidistributed(&self, u: &[f64], errors: &[f64], tolerance: f64, kept: f64) -> Option<Mesh> {
         let (degree, target) = (self.scheme.degree, TARGET * tolerance);
-        let limits = (degree, mesh::largest(self.n, degree));
+        // Orbits of boundary-value problems that need more have sharp layers, in which rounding limits the error.
+        let most = if self.is_open() { mesh::LARGEST } else { mesh::largest(self.n, degree) };
+        let limits = (degree, most);
         if self.halves {
             mesh::equidistributed_in_halves(errors, &self.mesh, limits, target, kept)
         } else if !self.is_open() && self.nearly_doubled(u) {

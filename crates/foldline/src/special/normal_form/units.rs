@@ -20,6 +20,8 @@ use crate::stability::blocks;
 const MOST: usize = 64;
 /// Distance of these points, in sizes of a state.
 const REACH: f64 = 0.5;
+/// Ratio of two units below which the states are left as they are: null vectors then lose two digits at most.
+const COMPARABLE: f64 = 100.0;
 /// Number of sweeps of (1), which converges by a factor in each; the units need not be exact.
 const SWEEPS: usize = 40;
 
@@ -56,6 +58,10 @@ pub fn units(field: &dyn VectorField, state: &[f64], parameters: &[f64], sizes: 
                 }
             }
         }
+    }
+    let most = units.iter().fold(0.0f64, |most, unit| most.max(*unit));
+    if units.iter().all(|unit| most < COMPARABLE * unit) {
+        units.fill(1.0);
     }
     let rate = (0..n * n).map(|k| m[k] * units[k % n] / units[k / n]).fold(0.0, f64::max);
     (units, rate)
