@@ -686,26 +686,32 @@ impl Follow<'_> {
         }
         // Two zeros may lie between neighbouring places.
         known.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let length = stretch.length.abs();
-        let within = |[before, here, after]: [&(f64, Vec<f64>); 3]| {
-            let distance = length * (here.0 - before.0).abs();
-            let history =
-                History { distance, values: before.1.clone(), marks: Vec::new(), spectrum: Vec::new(), stands: false };
-            let place = self.touched(&history, &here.1, &after.1, length * (after.0 - here.0).abs())?;
-            Some(stretch.length * here.0 + (stretch.length * (after.0 - here.0)).signum() * place)
-        };
-        known.windows(3).find_map(|three| {
+        let suspected = |three: &[(f64, Vec<f64>)]| {
             let [a, b, c] = [&three[0], &three[1], &three[2]];
-            within([a, b, c]).or_else(|| within([c, b, a]))
+            self.dips([a, b, c]).or_else(|| self.dips([c, b, a]))
+        };
+        let places: Vec<f64> = known.windows(3).filter_map(suspected).collect();
+        places.into_iter().map(|share| share * stretch.length).find(|s| {
+            let found = stretch.seen_at(sight, self.problem, self.settings, *s, cost);
+            found.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
         })
     }
 
-    /// True if a real eigenvalue passes 0, or a real multiplier 1, between two stations: their numbers beyond differ.
+    /// True if a real eigenvalue passes 0, or a real multiplier 1, between two stations: their numbers beyond differ, and none
+    /// is so close to it that errors decide on its side.
     fn passes_critical(&self, left: &Station, right: &Station) -> bool {
+        /// Distance, relative to the largest eigenvalue or multiplier, that errors do not reach: a hundred times the default
+        /// tolerance.
+        const CLEAR: f64 = 1e-4;
         let centre = if is_cycle(left) { 1.0 } else { 0.0 };
-        let beyond =
-            |station: &Station| station.point.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > centre).count();
-        beyond(left) != beyond(right)
+        let beyond = |station: &Station| {
+            let all = station.point.free_spectrum();
+            let size = all.iter().map(|z| z.norm()).fold(centre, f64::max);
+            let real = || all.iter().filter(|z| z.im == 0.0);
+            let clear = real().all(|z| (z.re - centre).abs() > CLEAR * size);
+            clear.then(|| real().filter(|z| z.re > centre).count())
+        };
+        beyond(left).zip(beyond(right)).is_some_and(|(left, right)| left != right)
     }
 
     /// Computes a full station at distance s of the interval.
@@ -739,13 +745,9 @@ impl Follow<'_> {
     /// the parabola through the values is close to zero or beyond it, or the middle if the line through the first two
     /// changes sign well before the last. `None` if every monitor stays clear of zero.
     fn touched(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> Option<f64> {
-        // Where the branch turns, the determinant changes sign with the slope, which shows it better.
-        let keeps = |k: usize| history.values[k] * left[k] > 0.0 && left[k] * right[k] > 0.0;
-        let turns = || (0..left.len()).any(|k| self.monitors[k].kind() == Kind::Fold && !keeps(k));
         (0..left.len()).find_map(|k| {
             let (a, b, c) = (history.values[k], left[k], right[k]);
-            let crossing = || self.monitors[k].kind() == Kind::BranchPoint;
-            if !keeps(k) || crossing() && (self.problem.has_multipliers() || turns()) {
+            if self.monitors[k].kind() == Kind::BranchPoint || a * b <= 0.0 || b * c <= 0.0 {
                 return None;
             }
             let (before, after) = ((b - a) / history.distance, (c - b) / length);
@@ -753,12 +755,30 @@ impl Follow<'_> {
             let slope = after - bend * length;
             let at = -slope / (2.0 * bend);
             let value = b + at * (slope + bend * at);
-            let near = if crossing() { 0.0 } else { 0.1 };
-            if bend * b > 0.0 && at > 0.0 && at < length && value / b < near {
+            if bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1 {
                 let place = (PLACES * at / length).round().clamp(1.0, PLACES - 1.0);
                 return Some(place * length / PLACES);
             }
-            (!crossing() && (b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
+            ((b + WELL * length * before) * b < 0.0).then_some(0.5 * length)
+        })
+    }
+
+    /// Place at which the parabola through the values of some monitor at three places `[a, b, c]` along a branch of equilibria
+    /// turns beyond zero, between the last two, although the values have the same sign. `None` if there is none.
+    fn dips(&self, [a, b, c]: [&(f64, Vec<f64>); 3]) -> Option<f64> {
+        let keeps = |k: usize| a.1[k] * b.1[k] > 0.0 && b.1[k] * c.1[k] > 0.0;
+        // Where the branch turns, the determinant changes sign with the slope, which shows it better.
+        let turns = (0..b.1.len()).any(|k| self.monitors[k].kind() == Kind::Fold && !keeps(k));
+        (0..b.1.len()).find_map(|k| {
+            if !keeps(k) || turns && self.monitors[k].kind() == Kind::BranchPoint {
+                return None;
+            }
+            let (before, after) = ((b.1[k] - a.1[k]) / (b.0 - a.0), (c.1[k] - b.1[k]) / (c.0 - b.0));
+            let bend = (after - before) / (c.0 - a.0);
+            let slope = before + bend * (b.0 - a.0);
+            let at = -slope / (2.0 * bend);
+            let beyond = (b.1[k] + at * (slope + bend * at)) * b.1[k] < 0.0;
+            (beyond && at * (c.0 - b.0) > 0.0 && at.abs() < (c.0 - b.0).abs()).then_some(b.0 + at)
         })
     }
 }
