@@ -131,7 +131,7 @@ fn periodic_tridiagonal(matrix: &[[f64; 2]], mut rhs: Vec<f64>, pinned: bool) ->
         rhs[j] -= factor * rhs[j - 1];
         along[j] -= factor * along[j - 1];
     }
-    if pivot[1..].iter().any(|own| !(*own > 0.0)) {
+    if pivot[1..].iter().any(|own| own.is_nan() || *own <= 0.0) {
         return None;
     }
     for column in [&mut rhs, &mut along] {
@@ -143,7 +143,7 @@ fn periodic_tridiagonal(matrix: &[[f64; 2]], mut rhs: Vec<f64>, pinned: bool) ->
     } else {
         let row = |v: &[f64]| matrix[0][1] * v[1] + matrix[count - 1][1] * v[count - 1];
         let pivot = matrix[0][0] + row(&along);
-        if !(pivot > 0.0) {
+        if pivot.is_nan() || pivot <= 0.0 {
             return None;
         }
         (rhs[0] - row(&rhs)) / pivot

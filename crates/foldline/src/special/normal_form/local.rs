@@ -88,7 +88,7 @@ impl<'a> Local<'a> {
         })
     }
 
-    /// The same equilibrium with the states measured in `units` `[n]`.
+    /// Equilibrium with the states measured in `units` `[n]`.
     pub fn in_units(mut self, units: &[f64]) -> Local<'a> {
         let n = self.n;
         (0..n * n).for_each(|k| self.jacobian[k] *= units[k % n] / units[k / n]);
@@ -96,7 +96,7 @@ impl<'a> Local<'a> {
         self
     }
 
-    /// The same equilibrium with null vectors computed for states of `sizes` `[n]`.
+    /// Equilibrium with null vectors computed for states of `sizes` `[n]`.
     pub(super) fn with_sizes(mut self, sizes: &[f64]) -> Local<'a> {
         self.sizes = sizes.to_vec();
         self
