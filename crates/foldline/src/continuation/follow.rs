@@ -301,7 +301,7 @@ impl Follow<'_> {
         Ok((tried, found))
     }
 
-    /// A step on a moving mesh within which there is no special point.
+    /// A step on a moving mesh within which there is no special point and stability does not change.
     fn moved_on(
         &mut self,
         left: &Station,
@@ -311,7 +311,8 @@ impl Follow<'_> {
     ) -> Option<(Step, Vec<Found>)> {
         let tried = self.moved(left, trail, step, cost)?.ok()?;
         let found = self.examined_between(left, &tried.right, trail, step, cost).ok()?;
-        found.is_empty().then_some((tried, found))
+        let quiet = found.is_empty() && left.point.unstable == tried.right.point.unstable;
+        quiet.then_some((tried, found))
     }
 
     /// Special points between both ends of a step.

@@ -97,8 +97,8 @@ impl Follow<'_> {
         if left.mesh.is_empty() {
             return if slope < STANDS { FoldTest::None } else { FoldTest::Slope };
         }
-        // An error beyond the distance from 0 to 1 says nothing about a family that is only entered.
-        let entered = right.point.is_one_of_family() && right.point.neutral_error() < 1.0;
+        // An error that is not small beside the distance from 0 to 1 says nothing about a family that is only entered.
+        let entered = right.point.is_one_of_family() && right.point.neutral_error() < 0.1;
         let family = stands && (left.point.is_one_of_family() || right.point.is_one_of_family()) || entered;
         if certain && slope * length.min(1.0) < unseen || family {
             return FoldTest::None;
