@@ -1,28 +1,7 @@
 //! Branches that leave a branch point, however the branches met there first, and points whose states differ in size.
 //! Positions and coefficients follow from closed forms unless a source is given.
 
-use std::process::Command;
-
-/// Output and exit code of a run of this model and study, at a tolerance.
-fn run(model: &str, study: &str, tolerance: &str) -> (String, i32) {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("model.toml"), format!("name = \"m\"\n{model}")).unwrap();
-    let study = format!("model = \"model.toml\"\ntolerance = {tolerance}\n{study}");
-    std::fs::write(folder.path().join("study.toml"), study).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_foldline"));
-    let output = command.args(["run", "study.toml", "--out", "run"]).current_dir(folder.path()).output().unwrap();
-    let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-    (text, output.status.code().unwrap())
-}
-
-/// Lines that begin with the name of a branch and its kind.
-fn points<'t>(text: &'t str, branch: &str, kind: &str) -> Vec<&'t str> {
-    text.lines().filter(|line| line.split_whitespace().take(2).eq([branch, kind])).collect()
-}
-
-fn value(line: &str, column: usize) -> f64 {
-    line.split_whitespace().nth(column).unwrap().parse().unwrap()
-}
+use crate::permuted::{points, run, value};
 
 /// Study of a branch `b` in `free` from a state, with branches that leave its branch points.
 fn followed(state: &str, free: &str, range: &str) -> String {
@@ -141,4 +120,65 @@ fn no_generalised_hopf_point_is_read_from_the_rounding_of_a_vanishing_frequency(
         + "[[curve]]\nname = \"H\"\nhold = \"hopf\"\nof = \"b/branch-point-1\"\nfree = \"b\"\nrange = [-1, 1]\n";
     let (text, code) = run(model, &study, "1e-6");
     assert!(code == 0 && text.contains("\nH ") && points(&text, "H", "generalised-hopf").is_empty(), "{text}");
+}
+
+#[test]
+fn exploring_from_a_value_at_which_two_branches_cross_joins_no_halves() {
+    // x = 0 and x = a; a = 0 is the first value that is examined.
+    let model = "[parameters]\na = 0.3\n[states]\nx = { equation = \"a*x - x^2\", range = [-2, 2] }\n";
+    let study = "[[explore]]\nname = \"x\"\nfree = \"a\"\nrange = [-1, 1]\n";
+    let (text, _) = run(model, study, "1e-6");
+    assert!(text.contains("x: 2 branches and 0 curves"), "{text}");
+    for branch in ["x/equilibrium-1", "x/equilibrium-1/branch-point-1"] {
+        let here = points(&text, branch, "branch-point");
+        assert!(here.len() == 1 && value(here[0], 2).abs() < 1e-8, "{text}");
+    }
+}
+
+/// Both Hopf points are one equilibrium of two Brusselators and its image with the cells exchanged; l₁ as in the unit test
+/// of the coefficient.
+#[test]
+fn hopf_points_that_are_images_of_each_other_are_both_followed() {
+    let cell = |own: &str, other: &str| {
+        format!(
+            "x{own} = {{ equation = \"1 - (B + 1)*x{own} + x{own}^2*y{own} + 0.05*(x{other} - x{own})\", range = [0, 3] }}\n\
+             y{own} = {{ equation = \"B*x{own} - x{own}^2*y{own} + 0.25*(y{other} - y{own})\", range = [0, 5] }}\n"
+        )
+    };
+    let model = format!("[parameters]\nB = 3.35\n[states]\n{}{}", cell("1", "2"), cell("2", "1"));
+    let study = "[[seed]]\nname = \"s\"\nstate = { x1 = 1, y1 = 3.2, x2 = 1, y2 = 3.2 }\nparameters = { B = 3.2 }\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"B\"\nrange = [3.1, 3.45]\n\
+                 switch = { branch-point = 1, hopf = 1 }\n";
+    for tolerance in ["1e-5", "1e-6"] {
+        let (text, _) = run(&model, study, tolerance);
+        let here = points(&text, "b/branch-point-1", "hopf");
+        assert!(here.len() == 2 && here.iter().all(|line| line.contains("l1 = 4.76413")), "{text}");
+        assert!(!text.contains("no bifurcating branch found"), "{text}");
+    }
+}
+
+/// Relaxation oscillations of the Oregonator between two subcritical Hopf points. f = 0.512644490558 agrees at tolerances
+/// from 1e-6 to 1e-9, with f of either sign.
+#[test]
+fn a_fold_of_canards_is_not_taken_for_a_family_at_one_parameter_value() {
+    let model = "[parameters]\nf = 0.3\n[states]\nx = { equation = \"(8e-4*y - x*y + x*(1 - x))/0.04\", range = [0, 1] }\n\
+                 y = { equation = \"(-8e-4*y - x*y + f*z)/4e-4\", range = [0, 2] }\n\
+                 z = { equation = \"x - z\", range = [0, 1] }\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"f\"\n\
+                 range = [0.3, 3]\nswitch = { hopf = 1 }\n";
+    let (text, code) = run(model, study, "1e-6");
+    let folds: Vec<f64> = points(&text, "b/hopf-1", "fold").iter().map(|line| value(line, 2)).collect();
+    assert!(code == 0 && folds.len() == 2 && (folds[0] - 0.512644490558).abs() < 1e-8, "{text}");
+}
+
+/// FitzHugh and Nagumo's equations are symmetric under v → -v, I → 1.75 - I, and with them their folds of cycles.
+#[test]
+fn a_mesh_that_no_longer_resolves_a_relaxation_oscillation_is_renewed() {
+    let model = "[parameters]\nI = 0\n[states]\nv = { equation = \"(v - v^3/3 - w + I)/0.002\", range = [-2, 2] }\n\
+                 w = { equation = \"v + 0.7 - 0.8*w\", range = [-1, 2] }\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"I\"\n\
+                 range = [0, 2]\nswitch = { hopf = 1 }\n";
+    let (text, code) = run(model, study, "1e-4");
+    let folds: Vec<f64> = points(&text, "b/hopf-1", "fold").iter().map(|line| value(line, 2)).collect();
+    assert!(code == 0 && folds.len() == 2 && (folds[0] + folds[1] - 1.75).abs() < 1e-5, "{text}");
 }

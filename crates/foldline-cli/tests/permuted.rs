@@ -3,7 +3,7 @@
 use std::process::Command;
 
 /// Output and exit code of a run of this model and study, at a tolerance.
-fn run(model: &str, study: &str, tolerance: &str) -> (String, i32) {
+pub(crate) fn run(model: &str, study: &str, tolerance: &str) -> (String, i32) {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("model.toml"), format!("name = \"m\"\n{model}")).unwrap();
     let study = format!("model = \"model.toml\"\ntolerance = {tolerance}\n{study}");
@@ -15,11 +15,11 @@ fn run(model: &str, study: &str, tolerance: &str) -> (String, i32) {
 }
 
 /// Lines that begin with the name of a branch and its kind.
-fn points<'t>(text: &'t str, branch: &str, kind: &str) -> Vec<&'t str> {
+pub(crate) fn points<'t>(text: &'t str, branch: &str, kind: &str) -> Vec<&'t str> {
     text.lines().filter(|line| line.split_whitespace().take(2).eq([branch, kind])).collect()
 }
 
-fn value(line: &str, column: usize) -> f64 {
+pub(crate) fn value(line: &str, column: usize) -> f64 {
     line.split_whitespace().nth(column).unwrap().parse().unwrap()
 }
 

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 #[track_caller]
-fn of(model: &str, study: &str) -> (Study, Diagram) {
+pub(crate) fn of(model: &str, study: &str) -> (Study, Diagram) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(format!("{model}.toml"));
     let text = format!("model = \"m\"\n{study}");
     let model = std::fs::read_to_string(path).unwrap();

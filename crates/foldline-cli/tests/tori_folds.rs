@@ -1,23 +1,8 @@
 //! Curves of folds of tori: against folds of branches at other values of the second parameter, and independent numbers in
 //! `reference/tori.csv` (invariant curves by Newton's method with high-order integration).
 
-use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Point};
-use foldline::explore::{self, System};
-use foldline_store::study_file::{Study, parse_study};
-use std::path::Path;
-
-#[track_caller]
-fn of(model: &str, study: &str) -> (Study, Diagram) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(format!("{model}.toml"));
-    let text = format!("model = \"m\"\n{study}");
-    let model = std::fs::read_to_string(path).unwrap();
-    let study = parse_study(&text, "study", &model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    let system = System::of_plan(&study.model, &study.plan);
-    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    drop(system);
-    (study, diagram)
-}
+use crate::tori::of;
+use foldline::diagram::{Branch, Ending, Family, Kind, Point};
 
 fn fold(branch: &Branch) -> &Point {
     &branch

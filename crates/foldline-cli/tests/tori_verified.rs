@@ -1,24 +1,11 @@
 //! `verify` on tori, unmodified and with numbers changed. The expected number of errors, none, is that of a correct program; the numbers of
 //! the tori themselves are compared with references in `tori`.
 
-use foldline::contract::Unobserved;
+use crate::tori::of;
 use foldline::diagram::{Diagram, Kind, Solution, Torus};
-use foldline::explore::{self, System};
+use foldline::explore::System;
 use foldline::verify::{Quantity, Verified, verify};
-use foldline_store::study_file::{Study, parse_study};
-use std::path::Path;
-
-#[track_caller]
-fn of(model: &str, study: &str) -> (Study, Diagram) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models").join(format!("{model}.toml"));
-    let text = format!("model = \"m\"\n{study}");
-    let model = std::fs::read_to_string(path).unwrap();
-    let study = parse_study(&text, "study", &model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    let system = System::of_plan(&study.model, &study.plan);
-    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    drop(system);
-    (study, diagram)
-}
+use foldline_store::study_file::Study;
 
 fn verified(study: &Study, diagram: &Diagram, branch: &str, sample: usize) -> Verified {
     let system = System::of_plan(&study.model, &study.plan);

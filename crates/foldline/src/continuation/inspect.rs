@@ -187,9 +187,7 @@ impl Follow<'_> {
                 && found.as_ref().is_ok_and(|found| {
                     // In a symmetric model the symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
-                        || !self.settings.is_symmetric()
-                            && !self.passes_critical(left, right)
-                            && self.is_vertex(&stretch, found.distance, cost)
+                        || !self.settings.is_symmetric() && self.is_vertex(&stretch, found.distance, cost)
                 })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);

@@ -1,10 +1,10 @@
 //! Steps on a mesh that moves along time with the jumps of a solution.
 //!
 //! **Idea.** A relaxation oscillation, a canard or a burst has jumps that move along time by more than they last while
-//! nothing else happens. In ordinary steps the states at fixed times are predicted, and the step size shrinks to a fraction of a jump.
-//! Here the tangent is split into a shift in time and a change of shape; the mesh follows the shift, and
-//! the states on it the change of shape. Lengths and angles are those of the change of shape, so that steps are as
-//! long as the shape permits.
+//! their shape hardly changes. An ordinary step predicts the states at fixed times, and is limited to a fraction of a
+//! jump. Here the tangent is split into a shift in time and a change of shape: the mesh follows the shift, and the states
+//! on it follow the change of shape. Lengths and angles are measured by the shape, so that steps are as long as it
+//! permits.
 //!
 //! **Equations.** With the shift w and the shape ρ of the unit tangent at u on the mesh t, and ϱ = |ρ|, a step of length
 //! ℓ = ϱ s leads to
@@ -15,8 +15,8 @@
 //!
 //! where w₋ and ρ₋ are those at the previous point, at the distance d, if the step to it was of this kind as well.
 //!
-//! **Fails when** a special point, a bound or the start lies within the step, or another branch is near. An ordinary, shorter step is then
-//! taken.
+//! **Fails when** a special point, a bound or the start lies within the step, or another branch is near. An ordinary step
+//! is then taken.
 
 use super::corrector::{Care, Failure, Plane, Station, correct_within, refine};
 use super::follow::Follow;
@@ -37,14 +37,15 @@ pub(super) struct Moving {
     pub(super) rate: f64,
 }
 
-/// Size of the shape of a unit tangent below which the shift accounts for most of it: for three quarters of its square.
+/// Largest change of shape along a unit tangent for a step on a moving mesh: the shift then accounts for three quarters of
+/// its square.
 const SHIFTED: f64 = 0.5;
-/// Shift, in lengths of an interval, that an ordinary step spans as well.
+/// Shift, in mesh intervals, up to which ordinary steps predict the states as well.
 const SPANNED: f64 = 1.0;
-/// Least length of an interval of the moved mesh, as a share of what it was: half of the length at which two of its ends
-/// would meet.
+/// Smallest ratio of the length of an interval on the moved mesh to its length before: halfway to its collapse.
 const SQUEEZED: f64 = 0.5;
-/// Longest step before an earlier one at which its change is trusted to continue, in lengths of that step.
+/// Smallest length of the previous step, in lengths of the present one, over which the change of the shape is divided: a
+/// shorter one would magnify its errors. The value is that of ordinary steps ([`super::step`]).
 const EARLIER: f64 = 0.2;
 
 impl Follow<'_> {

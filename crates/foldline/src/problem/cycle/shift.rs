@@ -1,8 +1,8 @@
 //! Changes of a cycle, split into a shift in time and a change of shape.
 //!
 //! **Idea.** On a relaxation oscillation or a burst, a small change of the parameter moves the jumps along time by more
-//! than they last. At a fixed time the states then change completely, and no linear prediction holds beyond a fraction of a jump. Seen from
-//! points that move with the jumps, the same change is small.
+//! than they last. At fixed times a linear prediction then fails beyond a fraction of a jump. Seen from points that move
+//! with the jumps, the change is small.
 //!
 //! **Equations.** x, t ∈ [0, 1], is the profile and δ its change. The shift w, linear on each mesh interval, minimises
 //!
