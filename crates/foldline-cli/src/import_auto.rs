@@ -178,7 +178,12 @@ fn listed(chosen: &[(&Source, &Labelled)]) -> Table {
             Cell::Count(solution.label),
             word(letters),
             word(kind),
-            word(if solution.lasts() { "cycle" } else { "equilibrium" }),
+            word(match (solution.lasts(), solution.problem) {
+                (false, _) => "equilibrium",
+                (true, Some(4 | 7)) => "profile",
+                (true, Some(9)) => "connecting orbit",
+                (true, _) => "cycle",
+            }),
         ];
         let value = |number: usize| solution.parameters.get(number - 1).map_or(Cell::Empty, |v| Cell::Number(*v));
         row.extend(free.iter().map(|(number, _)| value(*number)));

@@ -30,6 +30,7 @@ mod held;
 mod homotopies;
 mod impact;
 mod impact_and_switches;
+mod kinds;
 mod large_rotors;
 mod light_damping;
 mod many_components;

@@ -41,13 +41,15 @@ impl Mapping {
         states: &[(usize, String)],
         dim: usize,
     ) -> Result<Mapping, Complaint> {
-        if dim != model.dim() {
+        // AUTO adds an oscillator of two states to a forced system.
+        let forced = model.forced() && model.conditions() == [0, 0] && dim == model.dim() + 2;
+        if dim != model.dim() && !forced {
             let (own, theirs) = (counted(model.dim()), counted(dim));
             let message = format!("the model {} has {own}, but the solution has {theirs}", model.name);
             return Err(complaint(
                 message,
-                "give a model with the same states; forcing that AUTO generates with two extra states is not the \
-                 same as forcing in the model",
+                "give a model with the same states; for a forced model, the solution may have two states more, of the oscillator that \
+                 forces it",
             ));
         }
         let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
@@ -63,7 +65,7 @@ impl Mapping {
         let found: Option<Vec<usize>> = (0..known.len()).map(|i| typed[i].or(named[i])).collect();
         let states = match found {
             Some(found) => found,
-            None if typed.iter().chain(&named).all(Option::is_none) => (1..=dim).collect(),
+            None if typed.iter().chain(&named).all(Option::is_none) => (1..=model.dim()).collect(),
             None => {
                 let lacking: Vec<&str> =
                     (0..known.len()).filter(|i| typed[*i].or(named[*i]).is_none()).map(|i| known[i]).collect();
@@ -71,7 +73,8 @@ impl Mapping {
                 return Err(complaint(message, format!("give it, as in `--states 1={}`", known[0])));
             }
         };
-        if (1..=dim).any(|number| !states.contains(&number)) {
+        let twice = states.iter().enumerate().any(|(i, number)| *number == 0 || *number > dim || states[..i].contains(number));
+        if twice {
             let message = format!(
                 "`--states` does not match each of AUTO's states, 1 to {dim}, to a state of the \
                                    model"

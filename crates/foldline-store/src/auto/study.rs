@@ -14,6 +14,8 @@ const DEGREE: usize = 4;
 const LARGEST_MISMATCH: f64 = 1e-2;
 /// Largest accepted difference between the last and first state of a cycle, relative to the extent of the component.
 const LARGEST_GAP: f64 = 1e-3;
+/// IPS of HomCont.
+const CONNECTION: i64 = 9;
 
 /// Chosen solution, with the names and numbers that belong to it.
 pub struct Chosen<'a> {
@@ -33,8 +35,8 @@ pub struct Chosen<'a> {
 /// equations.
 ///
 /// # Errors
-/// If a solution is neither an equilibrium nor a cycle, if its free parameter is not assigned to one of the model, or if
-/// it does not satisfy the equations of the model.
+/// If no study starts from a solution of that kind, if its free parameter is not assigned to one of the model, or if it does not
+/// satisfy the equations of the model.
 pub fn study(model: &Model, model_file: &str, chosen: &[Chosen]) -> Result<String, Complaint> {
     let mut out = format!("# Starting points computed by AUTO-07p.\nmodel = {}\n", quoted(model_file));
     let mut taken: Vec<String> = Vec::new();
@@ -68,7 +70,15 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
     let solution = one.solution;
     let label = solution.label;
     let first = solution.free.first().copied();
-    let free = first.and_then(|number| one.mapping.parameters.iter().position(|own| *own == Some(number)));
+    let of_model = |number: &usize| one.mapping.parameters.iter().position(|own| *own == Some(*number));
+    let connects = solution.problem == Some(CONNECTION);
+    let open = model.conditions() != [0, 0];
+    // Of a connecting orbit the length of the interval may come first; parameters that conditions determine are not free.
+    let usable = |number: &&usize| !open || of_model(number).is_none_or(|own| !model.determined().contains(&own));
+    let free = match connects {
+        true => solution.free.iter().find_map(of_model),
+        false => solution.free.iter().find(usable).and_then(of_model),
+    };
     let Some(free) = free else {
         let number = first.unwrap_or(1);
         let known = model.parameters.first().map_or("NAME", |p| p.name.as_str());
@@ -88,6 +98,9 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
         .map(|(node, i)| of(node, i))
         .collect();
     let (body, given) = match solution.lasts() {
+        _ if open => arc(model, solution, &nodes, values)?,
+        true if connects => connection(model, one, &nodes)?,
+        true if model.forced() => response(model, solution, &nodes, values)?,
         true => cycle(model, solution, &nodes)?,
         false => equilibrium(model, solution, &nodes)?,
     };
@@ -113,7 +126,15 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
     let states: Vec<String> = states.map(|(own, number)| format!("{} = U({number})", own.name)).collect();
     let _ = writeln!(out, "# {}", states.join(", "));
     out.push_str(&body);
-    let branch = if solution.lasts() { "cycles" } else { "equilibria" };
+    if connects {
+        out.push_str(&curve(model, one, name, values, free)?);
+        return Ok(out);
+    }
+    let branch = match solution.lasts() {
+        _ if open => "solutions",
+        true => "cycles",
+        false => "equilibria",
+    };
     let value = values[free];
     let around = [value - 0.5 * value.abs().max(1.0), value + 0.5 * value.abs().max(1.0)];
     let (range, whose) = match one.names.range.filter(|[low, high]| (*low..=*high).contains(&value)) {
@@ -149,13 +170,6 @@ fn equilibrium(model: &Model, solution: &Labelled, state: &[f64]) -> Result<(Str
 
 fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, Solution), Complaint> {
     let (label, n, count) = (solution.label, model.dim(), solution.times.len());
-    if model.forced() {
-        let message = format!("the solution labelled {label} is a cycle, but the model is forced");
-        return Err(complaint(
-            message,
-            "in a study of a forced model, start with `attractor = \"cycle\"` or `state = { … }`; see the book",
-        ));
-    }
     if !matches!(solution.problem, None | Some(2)) {
         return Err(other_kind(solution));
     }
@@ -168,27 +182,11 @@ fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, 
                 "the solution labelled {label} does not close: `{}` ends {gap:.1e} from where it begins",
                 own.name
             );
-            return Err(complaint(
-                message,
-                "only equilibria and cycles can be imported, not boundary-value problems or connecting orbits",
-            ));
+            return Err(complaint(message, "a boundary-value problem needs a model with `[interval]` and `[boundary]`"));
         }
     }
-    let period = solution.period().filter(|period| *period > 0.0).ok_or_else(|| {
-        let message = format!("the solution labelled {label} has no positive period in PAR(11)");
-        complaint(
-            message,
-            "only equilibria and cycles can be imported, not boundary-value problems or connecting \
-                            orbits",
-        )
-    })?;
-    let unordered = || {
-        complaint(
-            format!("the times of the solution labelled {label} do not increase from 0 to 1"),
-            "copy the file again; AUTO writes increasing times",
-        )
-    };
-    let given = Cycle::given(period, &solution.times, states, solution.degree, DEGREE).ok_or_else(unordered)?;
+    let period = duration(solution)?;
+    let given = over(solution, states, period)?;
     let mut out = format!("[seed.cycle]\nperiod = {}\nthrough = {}\n", decimal(period), solution.degree);
     listed(&mut out, "times", solution.times.iter().copied());
     out.push_str("[seed.cycle.states]\n");
@@ -198,10 +196,194 @@ fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, 
     Ok((out, Solution::Cycle(given)))
 }
 
+/// PAR(11), the duration of a cycle or of a connecting orbit.
+fn duration(solution: &Labelled) -> Result<f64, Complaint> {
+    solution.period().filter(|period| *period > 0.0).ok_or_else(|| {
+        let message = format!("the solution labelled {} has no positive period in PAR(11)", solution.label);
+        complaint(message, "a boundary-value problem needs a model with `[interval]` and `[boundary]`")
+    })
+}
+
+/// The states `[times][n]` of a solution, over a duration.
+fn over(solution: &Labelled, states: &[f64], duration: f64) -> Result<Cycle, Complaint> {
+    Cycle::given(duration, &solution.times, states, solution.degree, DEGREE).ok_or_else(|| {
+        complaint(
+            format!("the times of the solution labelled {} do not increase from 0 to 1", solution.label),
+            "copy the file again; AUTO writes increasing times",
+        )
+    })
+}
+
+/// First profile of a boundary-value problem, whose independent variable runs from 0 to 1 in AUTO.
+fn arc(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) -> Result<(String, Solution), Complaint> {
+    let n = model.dim();
+    if !solution.lasts() || !matches!(solution.problem, None | Some(4 | 7)) {
+        let message = format!("the model is a boundary-value problem, but the solution labelled {} is not", solution.label);
+        return Err(complaint(message, "solutions of boundary-value problems have IPS = 4 or 7"));
+    }
+    let given = Cycle { forcing_periods: 1, ..over(solution, states, model.time_unit(values))? };
+    let mut out = format!("[seed.profile]\nthrough = {}\n", solution.degree);
+    listed(&mut out, "places", solution.times.iter().copied());
+    out.push_str("[seed.profile.states]\n");
+    for (i, own) in model.states.iter().enumerate() {
+        listed(&mut out, &key(&own.name), states.iter().skip(i).step_by(n).copied());
+    }
+    Ok((out, Solution::Cycle(given)))
+}
+
+/// State at the beginning of a forcing period on a cycle of a forced model. The phase of the oscillator that forces it in AUTO is
+/// unknown here; it is the one with which the cycle satisfies the equations best.
+fn response(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) -> Result<(String, Solution), Complaint> {
+    /// Largest accepted deviation of the period from that of the forcing, relative.
+    const ONE_PERIOD: f64 = 1e-3;
+    /// Phases that are compared, and steps of the golden section from the best of them.
+    const PHASES: usize = 64;
+    const STEPS: usize = 50;
+    /// Intervals of the shifted cycle.
+    const INTERVALS: usize = 100;
+    let label = solution.label;
+    if !matches!(solution.problem, None | Some(2)) {
+        return Err(other_kind(solution));
+    }
+    let (period, unit) = (duration(solution)?, model.time_unit(values));
+    if (period / unit - 1.0).abs() > ONE_PERIOD {
+        let message =
+            format!("the cycle labelled {label} has the period {period}, but that of the forcing is {unit} at its parameters");
+        return Err(complaint(
+            message,
+            "import a cycle of one forcing period, and switch to longer ones at its period doublings",
+        ));
+    }
+    let whole = over(solution, states, period)?;
+    let count = INTERVALS * DEGREE;
+    let times: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+    let shifted = |phase: f64| -> Option<Cycle> {
+        let states: Vec<f64> = times.iter().flat_map(|t| whole.state((t + phase).rem_euclid(1.0))).collect();
+        Some(Cycle { forcing_periods: 1, ..Cycle::given(period, &times, &states, DEGREE, DEGREE)? })
+    };
+    let off = |phase: f64| {
+        let found = shifted(phase).and_then(|cycle| mismatch(model, values, &Solution::Cycle(cycle)));
+        found.map_or(f64::INFINITY, |(_, share)| share)
+    };
+    let first = (0..PHASES).map(|k| k as f64 / PHASES as f64).min_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or(0.0);
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let [mut a, mut b] = [-1.0, 1.0].map(|side| first + side / PHASES as f64);
+    for _ in 0..STEPS {
+        let (left, right) = (b - golden * (b - a), a + golden * (b - a));
+        *(if off(left) < off(right) { &mut b } else { &mut a }) = if off(left) < off(right) { right } else { left };
+    }
+    let lost = || complaint(format!("the cycle labelled {label} cannot be shifted"), "copy the file again");
+    let found = shifted(0.5 * (a + b)).ok_or_else(lost)?;
+    let mut out = String::from("[seed.state]\n");
+    for (own, value) in model.states.iter().zip(found.state(0.0)) {
+        let _ = writeln!(out, "{} = {}", key(&own.name), decimal(value));
+    }
+    Ok((out, Solution::Cycle(found)))
+}
+
+/// Numbers of the parameters in which AUTO stores the equilibria begin here.
+const EQUILIBRIA: usize = 11;
+
+/// The equilibrium that a connecting orbit leaves (`end` 0) or, if it is another one, at which it arrives (1).
+fn stored(model: &Model, one: &Chosen, end: usize) -> Option<Vec<f64>> {
+    let n = model.dim();
+    let all = one.solution.parameters.get(EQUILIBRIA + end * n..EQUILIBRIA + (end + 1) * n)?;
+    let state: Vec<f64> = one.mapping.states.iter().map(|number| all[number - 1]).collect();
+    let values = parameters(model, one).ok()?;
+    let found = mismatch(model, &values, &Solution::Equilibrium(state.clone()));
+    found.filter(|(_, share)| *share <= LARGEST_MISMATCH).map(|_| state)
+}
+
+/// Largest distance of two states, relative to the extents of the components along an orbit.
+fn apart(states: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let n = a.len();
+    let share = |i: usize| {
+        let values = || states.iter().skip(i).step_by(n).copied();
+        let extent = values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
+        (a[i] - b[i]).abs() / extent.max(f64::MIN_POSITIVE)
+    };
+    (0..n).map(share).fold(0.0, f64::max)
+}
+
+/// The second equilibrium of a heteroclinic orbit.
+fn arrival(model: &Model, one: &Chosen, states: &[f64]) -> Option<Vec<f64>> {
+    let n = model.dim();
+    let last = &states[states.len() - n..];
+    let (from, to) = (stored(model, one, 0)?, stored(model, one, 1)?);
+    (apart(states, last, &to) < apart(states, last, &from)).then_some(to)
+}
+
+/// The equilibrium that a connecting orbit leaves, and the orbit.
+fn connection(model: &Model, one: &Chosen, states: &[f64]) -> Result<(String, Solution), Complaint> {
+    let label = one.solution.label;
+    if model.forced() {
+        let message = format!("the solution labelled {label} is a connecting orbit, but the model is forced");
+        return Err(complaint(message, "give a model without forcing"));
+    }
+    let Some(from) = stored(model, one, 0) else {
+        let message = format!(
+            "the parameters from PAR({}) on of the solution labelled {label} are no equilibrium of the model",
+            EQUILIBRIA + 1
+        );
+        return Err(complaint(message, "HomCont stores the equilibrium there; compare the equations of the model"));
+    };
+    let orbit = over(one.solution, states, duration(one.solution)?)?;
+    let mut out = String::from("[seed.state]\n");
+    for (own, value) in model.states.iter().zip(&from) {
+        let _ = writeln!(out, "{} = {}", key(&own.name), decimal(*value));
+    }
+    Ok((out, Solution::Cycle(orbit)))
+}
+
+/// The branch of the equilibrium and the curve of the orbit.
+fn curve(model: &Model, one: &Chosen, name: &str, values: &[f64], free: usize) -> Result<String, Complaint> {
+    let label = one.solution.label;
+    let nodes: Vec<f64> = one
+        .solution
+        .states
+        .chunks_exact(one.solution.dim())
+        .flat_map(|state| one.mapping.states.iter().map(|number| state[number - 1]))
+        .collect();
+    let of_model = |number: &usize| one.mapping.parameters.iter().position(|own| *own == Some(*number));
+    let others = one.solution.free.iter().filter_map(of_model).chain((0..model.parameters.len()).filter(|k| {
+        // A parameter that the solution does not vary, if it varies no second one.
+        one.mapping.parameters[*k].is_some()
+    }));
+    let Some(second) = others.into_iter().find(|k| *k != free) else {
+        let message = format!("the connecting orbit labelled {label} has only one parameter, and curves need two");
+        return Err(complaint(message, "name a second one, as in `--parameters 1=mu,2=nu`"));
+    };
+    let around = |k: usize, share: f64| {
+        let reach = share * values[k].abs().max(1.0);
+        [values[k] - reach, values[k] + reach].map(decimal).join(", ")
+    };
+    let heteroclinic = arrival(model, one, &nodes);
+    let hold = if heteroclinic.is_some() { "heteroclinic" } else { "homoclinic" };
+    let to = heteroclinic.map_or_else(String::new, |to| {
+        let all: Vec<String> =
+            model.states.iter().zip(to).map(|(own, value)| format!("{} = {}", key(&own.name), decimal(value))).collect();
+        format!("to = {{ {} }}\n", all.join(", "))
+    });
+    let (branch, first) = (quoted(&format!("equilibria from {name}")), quoted(&model.parameters[free].name));
+    Ok(format!(
+        "\n[[branch]]\nname = {branch}\nfrom = {}\nfree = {first}\nrange = [{}] # edit as needed\n\n\
+         # The orbit is searched for next to this value, from the equilibrium.\n\
+         [[curve]]\nname = {}\nhold = \"{hold}\"\nof = {branch}\nnear = {}\n{to}free = {}\nrange = [{}] # edit as needed\n",
+        quoted(name),
+        around(free, 0.1),
+        quoted(&format!("orbits from {name}")),
+        decimal(values[free]),
+        quoted(&model.parameters[second].name),
+        around(second, 0.5),
+    ))
+}
+
 fn other_kind(solution: &Labelled) -> Complaint {
     let (label, problem) = (solution.label, solution.problem.unwrap_or_default());
     let message = format!("the solution labelled {label} was computed with IPS = {problem}");
-    complaint(message, "equilibria (IPS = 1) and cycles (IPS = 2) can be imported")
+    let hint = "equilibria (IPS = 1), cycles (IPS = 2) and connecting orbits (IPS = 9) can be imported, and with a model of a \
+                boundary-value problem its solutions (IPS = 4, 7)";
+    complaint(message, hint)
 }
 
 /// Checks that a solution satisfies the equations of the model.

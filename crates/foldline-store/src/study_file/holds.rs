@@ -4,6 +4,7 @@ use super::branches::{quantity, range, reading_unit};
 use super::items::{Ground, Item};
 use super::unknown_parameter;
 use crate::toml_walk::Walk;
+use foldline::contract::VectorField;
 use foldline::diagram::{Family, Shown};
 use foldline::explore::Start;
 use foldline::explore::plan::Holds;
@@ -53,7 +54,9 @@ pub(super) fn read(walk: &mut Walk, item: &Item, model: &Model) -> Option<Held> 
         return None;
     }
     for level in &levels {
-        if let Quantity::Parameter(index) = level.quantity {
+        if let Quantity::Parameter(index) = level.quantity
+            && !model.determined().contains(&index)
+        {
             let at = table.get("hold").map_or(item.span.clone(), |value| value.span());
             let name = &model.parameters[index].name;
             walk.report(
@@ -93,6 +96,11 @@ fn frees(walk: &mut Walk, item: &Item, model: &Model) -> Option<Vec<usize>> {
             continue;
         };
         match model.parameter_index(&name) {
+            Some(index) if model.determined().contains(&index) => {
+                let message = format!("{name} follows from the conditions of the model, which lists it under `solve`");
+                walk.report(one.span(), message, "a parameter that is not listed there");
+                wrong = true;
+            }
             Some(index) if found.contains(&index) => {
                 walk.report(one.span(), format!("{name} is given twice"), "parameters that differ");
                 wrong = true;
@@ -150,10 +158,39 @@ fn levels(walk: &mut Walk, item: &Item, model: &Model) -> Option<Vec<Level>> {
 /// The quantity of that name; a bare state or output means its value at an equilibrium.
 fn held_quantity(walk: &mut Walk, name: &str, span: std::ops::Range<usize>, model: &Model) -> Option<Quantity> {
     let output = || model.output_index(name).map(|index| model.states.len() + index);
+    if model.conditions() != [0, 0] {
+        return along_interval(walk, name, span, model);
+    }
     if let Some(channel) = model.state_index(name).or_else(output) {
         return Some(Quantity::Mean(channel));
     }
     quantity(walk, name, span, model)
+}
+
+/// The quantity of that name of a boundary-value problem. Extrema may lie at an end, where they do not vary smoothly.
+fn along_interval(walk: &mut Walk, name: &str, span: std::ops::Range<usize>, model: &Model) -> Option<Quantity> {
+    let varies = model.state_index(name).is_some() || model.output_index(name).is_some();
+    let found = if varies { None } else { Some(quantity(walk, name, span.clone(), model)?) };
+    let smooth = |own: &Quantity| {
+        matches!(
+            own,
+            Quantity::At(..) | Quantity::Mean(_) | Quantity::Rms(_) | Quantity::Integral(_) | Quantity::Parameter(_)
+        )
+    };
+    if found.as_ref().is_some_and(smooth) {
+        return found;
+    }
+    let message = match varies {
+        true => format!("{name} varies along the interval"),
+        false => format!("`{name}` cannot be held in boundary-value problems"),
+    };
+    let x = model.states.first().map_or("x", |own| own.name.as_str());
+    walk.report(
+        span,
+        message,
+        format!("a value at a place such as `{x}@0.5`, `{x}_mean`, `{x}_rms`, `{x}_integral`, or a parameter of `solve`"),
+    );
+    None
 }
 
 /// Reads `range` and `until`: a pair of numbers for the first parameter, or a table with one for each; ranges of the

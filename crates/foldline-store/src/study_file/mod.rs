@@ -359,12 +359,9 @@ fn no_motions(walk: &mut Walk, root: &DeTable, model: &Model) {
         walk.report(span, message, "give a first profile with `[[seed]]` and follow it with `[[branch]]`");
     }
     for (_, table) in walk.tables(root, "branch") {
-        for key in ["hold", "peaks"] {
-            if let Some(value) = table.get(key) {
-                let message = format!("`{key}` is not supported for boundary-value problems");
-                let hint = "make the quantity a condition of the model, with the second parameter under `solve`";
-                walk.report(value.span(), message, hint);
-            }
+        if let Some(value) = table.get("peaks") {
+            let message = "`peaks` is not supported for boundary-value problems";
+            walk.report(value.span(), message, "mark values of the quantity along the branch, with `mark`");
         }
     }
 }

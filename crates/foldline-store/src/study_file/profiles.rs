@@ -1,4 +1,4 @@
-//! `cycle` of a seed, a cycle computed or measured elsewhere, and `state` of a boundary-value problem, a first profile.
+//! `cycle` of a seed, a cycle computed or measured elsewhere, and `state` or `profile` of a boundary-value problem, a first profile.
 
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
@@ -42,35 +42,55 @@ pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize
         );
         return None;
     }
-    let through = table.get("through").and_then(|v| walk.integer(v, "`through`", 1..=12)).unwrap_or(1) as usize;
-    let place = table.get("times")?;
-    let times = list(walk, place, "`times`", "")?;
-    if let Some(k) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
-        let hint = "normalised times increase from 0 at the start to 1 at the end of the period";
-        walk.report(
-            place.span(),
-            format!("the times do not increase: {} is followed by {}", times[k], times[k + 1]),
-            hint,
-        );
-        return None;
-    }
-    if times.first() != Some(&0.0) || times.last() != Some(&1.0) {
-        let hint = "divide the times by the period: the first is 0, the last 1";
-        walk.report(place.span(), "the times do not run from 0 to 1", hint);
-        return None;
-    }
-    if !(times.len() - 1).is_multiple_of(through) {
-        let message =
-            format!("the number of time steps, {}, is not a multiple of `through`, {through}", times.len() - 1);
-        walk.report(place.span(), message, "remove `through`, or give the nodes of every mesh interval");
-        return None;
-    }
+    let (through, times) = places(walk, table, ["times", "period"])?;
     let states = states(walk, table.get("states")?, model, times.len())?;
     let found = Cycle::given(period, &times, &states, through, degree);
     if found.is_none() {
         walk.report(value.span(), "these times and states do not form a cycle", "a state for each time, from 0 to 1");
     }
     found
+}
+
+/// Reads `through` and the normalised times or places under the key `key`, relative to `whole`.
+fn places(walk: &mut Walk, table: &DeTable, [key, whole]: [&str; 2]) -> Option<(usize, Vec<f64>)> {
+    let through = table.get("through").and_then(|v| walk.integer(v, "`through`", 1..=12)).unwrap_or(1) as usize;
+    let place = table.get(key)?;
+    let found = list(walk, place, &format!("`{key}`"), "")?;
+    if let Some(k) = found.windows(2).position(|pair| pair[0] >= pair[1]) {
+        let hint = format!("normalised {key} increase from 0 at the start to 1 at the end of the {whole}");
+        let message = format!("the {key} do not increase: {} is followed by {}", found[k], found[k + 1]);
+        walk.report(place.span(), message, hint);
+        return None;
+    }
+    if found.first() != Some(&0.0) || found.last() != Some(&1.0) {
+        let hint = format!("divide the {key} by the {whole}: the first is 0, the last 1");
+        walk.report(place.span(), format!("the {key} do not run from 0 to 1"), hint);
+        return None;
+    }
+    if !(found.len() - 1).is_multiple_of(through) {
+        let what = if key == "times" { "time steps" } else { "steps" };
+        let message = format!("the number of {what}, {}, is not a multiple of `through`, {through}", found.len() - 1);
+        walk.report(place.span(), message, "remove `through`, or give the nodes of every mesh interval");
+        return None;
+    }
+    Some((through, found))
+}
+
+/// Reads the values of a first profile at given places, and represents it by polynomials of degree `degree`.
+fn given_profile(walk: &mut Walk, value: &Value, model: &Model, degree: usize, parameters: &[f64]) -> Option<Cycle> {
+    const HINT: &str = "`profile = { places = [0, …, 1], states = { u = […], … } }`";
+    let table = walk.table(value, "`profile`")?;
+    walk.only(table, &["through", "places", "states"], "a profile");
+    let missing: Vec<&str> = ["places", "states"].into_iter().filter(|key| table.get(*key).is_none()).collect();
+    if !missing.is_empty() {
+        walk.report(value.span(), format!("the profile lacks {}", missing.join(", ")), HINT);
+        return None;
+    }
+    let (through, places) = places(walk, table, ["places", "length"])?;
+    let states = states(walk, table.get("states")?, model, places.len())?;
+    let mut found = Cycle::given(model.time_unit(parameters), &places, &states, through, degree)?;
+    found.forcing_periods = 1;
+    Some(found)
 }
 
 /// Reads the states, `[count][n]`.
@@ -96,7 +116,7 @@ fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option
         let values = list(walk, place, &format!("the state `{name}`"), &model.states[i].unit)?;
         if values.len() != count {
             let message = format!("the state `{name}` has {} values where there are {count} times", values.len());
-            walk.report(place.span(), message, "give a value for each time, including the end of the period");
+            walk.report(place.span(), message, "give a value for each time, including the last");
             return None;
         }
         values.iter().enumerate().for_each(|(k, v)| out[k * known.len() + i] = *v);
@@ -149,9 +169,17 @@ pub(super) fn arc(
             return None;
         }
     }
-    let Some(value) = table.get("state") else {
-        walk.report(span.clone(), "this seed gives no profile", HINT);
-        return None;
+    let value = match (table.get("state"), table.get("profile")) {
+        (Some(value), None) => value,
+        (None, Some(value)) => return given_profile(walk, value, model, degree, parameters),
+        (Some(_), Some(value)) => {
+            walk.report(value.span(), "this seed has both a `state` and a `profile`", "keep one of them");
+            return None;
+        }
+        (None, None) => {
+            walk.report(span.clone(), "this seed gives no profile", HINT);
+            return None;
+        }
     };
     let names: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
     let mut texts = vec!["0".to_string(); names.len()];

@@ -13,8 +13,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 10] =
-    ["name", "description", "attractor", "periods", "state", "cycle", "torus", "parameters", "samples", "random"];
+pub(super) const KEYS: [&str; 11] = [
+    "name", "description", "attractor", "periods", "state", "cycle", "profile", "torus", "parameters", "samples", "random",
+];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 /// Default number of initial states in a cell of a map.
@@ -96,6 +97,11 @@ fn source(
         return found.unwrap_or(SeedSource::Attractor(AttractorKey::Equilibrium));
     }
     let fallback = SeedSource::Attractor(AttractorKey::Equilibrium);
+    if let Some(value) = table.get("profile") {
+        let message = "only boundary-value problems start from a `profile`";
+        walk.report(value.span(), message, "give a `state`, or a whole `cycle`");
+        return fallback;
+    }
     let found = match (table.get("attractor"), table.get("state"), table.get("cycle")) {
         (Some(value), None, None) if value.get_ref().as_str() == Some("torus") => quasi_periodic(walk, value, model),
         (Some(value), None, None) => attractor(walk, value, model).map(SeedSource::Attractor),

@@ -3,7 +3,9 @@
 
 mod programs;
 
-use foldline::explore::{SeedSource, mismatch};
+use foldline::contract::Unobserved;
+use foldline::diagram::{Diagram, Kind};
+use foldline::explore::{self, SeedSource, System, mismatch};
 use foldline::model::Model;
 use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, solutions, study};
 use foldline_store::model_file::parse_model;
@@ -14,6 +16,9 @@ const CYCLES: &str = include_str!("s.ab-cycles");
 const CONSTANTS: &str = include_str!("c.ab");
 const BRANCH: &str = include_str!("b.ab");
 const MODEL: &str = include_str!("../../../../models/ab-reaction.toml");
+const BRATU: [&str; 2] = [include_str!("s.bratu"), include_str!("../../../../models/bratu.toml")];
+const DUFFING: [&str; 2] = [include_str!("s.duffing"), include_str!("../../../../models/duffing-forced.toml")];
+const CIRCUIT: [&str; 2] = [include_str!("s.cir"), include_str!("../../../../models/freire-circuit.toml")];
 
 fn model(text: &str) -> Model {
     parse_model(text, "m.toml").unwrap()
@@ -161,7 +166,7 @@ fn mismatches_with_the_model_are_reported() {
             "does not satisfy the model: the relative residual of the equation of `u2` is",
         ),
         (&three, &named, [&[], &[]], "has 3 states, but the solution has 2 states"),
-        (&forced, &named, [&[], &[]], "is a cycle, but the model is forced"),
+        (&forced, &named, [&[], &[]], "has the period 2.9999981419, but that of the forcing is 6.283185307179586 at its"),
     ];
     for (model, names, pairs, message) in cases {
         let found = imported(model, CYCLES, names, pairs).unwrap_err();
@@ -201,4 +206,68 @@ fn mistakes_in_a_given_cycle_are_reported_with_position_and_cure() {
             found.iter().map(|d| format!("{}:{}:{}: {}", d.file, d.line, d.column, d.message)).collect();
         assert!(told.iter().any(|told| told.contains(message)), "{message}: {told:?}");
     }
+}
+
+/// The study that starts from the only solution of a file, as text.
+fn imported_with(file: &str, text: &str, pairs: &[(usize, &str)]) -> Result<String, Complaint> {
+    imported(&model(text), file, &Names::default(), [pairs, &[]])
+}
+
+#[test]
+fn a_solution_of_a_boundary_value_problem_starts_a_branch() {
+    let [file, text] = BRATU;
+    let written = imported_with(file, text, &[(1, "p")]).unwrap();
+    let study = parse_study(&written.replace("[1.0, 3.0]", "[0.0, 4.0]"), "s.toml", text, "m.toml").unwrap();
+    let seed = &study.plan.seeds[0];
+    let SeedSource::Cycle(given) = &seed.source else { panic!("{:?}", seed.source) };
+    assert_eq!((given.intervals(), given.degree, given.forcing_periods, seed.parameters[0]), (8, 4, 1, 2.0));
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    let branch = diagram.branch("solutions from label 2").unwrap();
+    let fold = branch.special.iter().find(|special| special.kind == Kind::Fold).unwrap();
+    // 8 of the largest (θ / cosh θ)², as in Bratu's closed form.
+    assert!((fold.point.parameters[0] - 3.513830719125162).abs() < 1e-6, "{:?}", fold.point.parameters);
+}
+
+#[test]
+fn a_cycle_of_a_forced_system_starts_at_the_phase_of_the_forcing() {
+    let [file, text] = DUFFING;
+    let all = [(1, "omega"), (2, "A"), (3, "zeta")];
+    let written = imported_with(file, text, &all).unwrap();
+    let study = parse_study(&written, "s.toml", text, "m.toml").unwrap();
+    let SeedSource::State(state) = &study.plan.seeds[0].source else { panic!("{:?}", study.plan.seeds[0].source) };
+    // The force A cos(ωt) is largest where AUTO's fourth state, the cosine of its oscillator, is 1.
+    let solution = &solutions(file, "s.duffing").unwrap()[0];
+    let top = solution.states.chunks_exact(4).max_by(|a, b| a[3].total_cmp(&b[3])).unwrap();
+    // The phase is that of the smallest largest residual, to the square root of its rounding; speeds are below 0.05.
+    assert!(state.iter().zip(top).all(|(a, b)| (a - b).abs() < 1e-3), "{state:?} {top:?}");
+    let slower = imported_with(file, text, &[(2, "A"), (3, "zeta")]).unwrap_err();
+    assert!(slower.message.contains("but that of the forcing is"), "{slower:?}");
+    let stronger = imported_with(file, &text.replace("- x^3", "- 2*x^3 - 0.5*x"), &all).unwrap_err();
+    assert!(stronger.message.contains("does not satisfy the model"), "{stronger:?}");
+}
+
+#[test]
+fn a_connecting_orbit_becomes_a_curve_next_to_it() {
+    let [file, text] = CIRCUIT;
+    let numbers = [(1, "nu"), (2, "beta"), (3, "gamma"), (4, "r"), (5, "a3"), (6, "b3")];
+    let written = imported_with(file, text, &numbers).unwrap();
+    assert!(written.contains("hold = \"homoclinic\"") && written.contains("free = \"beta\""), "{written}");
+    let study = parse_study(&written, "s.toml", text, "m.toml").unwrap();
+    let curve = &study.plan.curves[0];
+    assert!((curve.near.unwrap() + 0.721309).abs() < 1e-5, "{:?}", curve.near);
+    let SeedSource::State(state) = &study.plan.seeds[0].source else { panic!("{:?}", study.plan.seeds[0].source) };
+    assert!(state.iter().all(|x| x.abs() < 1e-6), "{state:?}");
+    let other = imported_with(file, &text.replace("a3*x^3", "a3*x^3 + 0.1"), &numbers).unwrap_err();
+    assert!(other.message.contains("are no equilibrium of the model"), "{other:?}");
+    let bent = imported_with(file, &text.replace("beta*x - ", "beta*x + x^3 - "), &numbers).unwrap_err();
+    assert!(bent.message.contains("does not satisfy the model"), "{bent:?}");
+}
+
+#[test]
+fn solutions_of_another_kind_than_the_model_are_refused() {
+    let boundary = imported_with(BRATU[0], MODEL, &[(1, "p1")]).unwrap_err();
+    assert!(boundary.message.contains("IPS = 4") && boundary.hint.contains("boundary-value"), "{boundary:?}");
+    let cycle = imported_with(CYCLES, BRATU[1], &[(1, "p")]).unwrap_err();
+    assert!(cycle.message.contains("is a boundary-value problem, but the solution labelled 7 is not"), "{cycle:?}");
 }

@@ -67,7 +67,7 @@ pub(super) fn from_arc(system: &System, seed: &SeedPlan, tolerance: f64, guess: 
     let mut given = bare(&seed.parameters, Solution::Cycle(guess.clone()));
     let mut problem = problem_of(system, free, guess.degree, &given, false);
     if let Some(u) = damped(&mut *problem, &given, CLOSE) {
-        given.solution = problem.point(&u, &[], Examination::default()).solution;
+        given = problem.point(&u, &[], Examination::default());
     }
     first(&mut *problem, &settings, &given).map(|found| found.point).map_err(|failure| {
         format!(

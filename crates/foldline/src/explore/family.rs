@@ -323,7 +323,7 @@ impl Work<'_> {
     ) -> Option<(Branch, bool)> {
         let bounded = |(settings, sides): (Settings, [bool; 2])| {
             let bounds = plan.holds.others.iter().filter_map(|(index, range)| Some((*index, (*range)?))).collect();
-            let stability = settings.stability && !plan.holds.singular;
+            let stability = settings.stability && !plan.holds.singular && !self.system.is_open();
             (Settings { bounds, stability, ..settings }, sides)
         };
         let grow = |holds: &Holds, settings: &Settings, sides, branch: &mut Branch, station: Option<Station>| {

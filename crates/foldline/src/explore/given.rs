@@ -76,11 +76,15 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
     let scheme = Scheme::new(m);
     let mut sizes = vec![[0.0f64; 2]; n];
     let mut f = vec![0.0; n];
+    // A forced field is measured in forcing periods, that of a boundary-value problem in lengths of the interval.
+    let whole = if field.forced() { f64::from(cycle.forcing_periods) } else { cycle.period };
     for (ends, nodes) in cycle.mesh.windows(2).zip(cycle.profile.chunks_exact((m + 1) * n)) {
-        let duration = (ends[1] - ends[0]) * cycle.period;
-        for (state, row) in nodes.chunks_exact(n).skip(1).zip(scheme.derivative.chunks_exact(m + 1)) {
-            let at =
-                Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
+        let duration = (ends[1] - ends[0]) * whole;
+        let rows = scheme.nodes[1..].iter().zip(scheme.derivative.chunks_exact(m + 1));
+        for (state, (node, row)) in nodes.chunks_exact(n).skip(1).zip(rows) {
+            let time = [f64::from(cycle.forcing_periods) * (ends[0] + (ends[1] - ends[0]) * node)];
+            let times = if field.forced() { &time[..] } else { &[] };
+            let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times, signs: &[] };
             field.evaluate(at, &mut f);
             for (i, [off, size]) in sizes.iter_mut().enumerate() {
                 let slope: f64 = row.iter().zip(nodes.iter().skip(i).step_by(n)).map(|(d, x)| d * x).sum();

@@ -98,7 +98,7 @@ impl Line {
             }
         };
         let sizes: Vec<f64> = holds.levels.iter().map(|level| system.size_of(level.quantity)).collect();
-        let free = setting.freedom();
+        let free = setting.freedom() - system.field.determined().len();
         let condition: Box<dyn Condition + 'a> = match &like {
             Solution::Cycle(cycle) if holds.singular => {
                 Box::new(OnCycleBranchPoints::in_three_parameters(setting, cycle))
@@ -600,7 +600,8 @@ impl Growth<'_> {
         let (monitors, collapses) = match branch.held {
             None if system.holds.is_some_and(|holds| holds.singular) => (Vec::new(), Vec::new()),
             None if system.holds.is_some() => {
-                (special::monitors_of_held_quantities(branch.family, symmetric), collapses(branch, &system))
+                let own = special::monitors_of_held_quantities(branch.family, symmetric, branch.free);
+                (own, collapses(branch, &system))
             }
             None => (special::monitors(branch.family, symmetric), collapses(branch, &system)),
             Some((kind, first)) => {
@@ -1109,7 +1110,7 @@ impl Growth<'_> {
         /// Slope of a parameter below which the solutions turn. Empirical: the slope is of the order of the error of the
         /// special point at a fold, and of order 1 at a branch point.
         const TURNS: f64 = 1e-3;
-        if special.kind != Kind::Fold || system.holds.is_none() {
+        if special.kind != Kind::Fold || system.holds.is_none() || system.is_open() {
             return;
         }
         let alone = System { holds: None, ..system.clone() };

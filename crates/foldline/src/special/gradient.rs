@@ -482,7 +482,12 @@ impl<'a> Along<'a> {
                 found.value = root;
                 Some((found, None))
             }
-            Quantity::Iterate(..) | Quantity::At(..) => None,
+            Quantity::At(k, place) => {
+                let Solution::Cycle(cycle) = self.solution else { return None };
+                let samples = self.at(cycle, f64::from_bits(place));
+                whole(self.sum(k, &samples, &[1.0], |value| [value, 1.0]))
+            }
+            Quantity::Iterate(..) => None,
             Quantity::Of(own) => self.term(own, near),
             Quantity::Decibels(own) => {
                 let (found, time) = self.term(own, near)?;
@@ -523,9 +528,10 @@ impl Samples {
     }
 }
 
-/// Interval of a normalised time, and the position in it.
+/// Interval of a normalised time, and the position in it. The end, 1, belongs to the last interval: the two ends of a solution of a
+/// boundary-value problem differ.
 fn place(cycle: &Cycle, time: f64) -> (usize, f64) {
-    let t = time - time.floor();
+    let t = if time == 1.0 { 1.0 } else { time - time.floor() };
     let j = cycle.mesh.partition_point(|end| *end <= t).clamp(1, cycle.intervals()) - 1;
     (j, (t - cycle.mesh[j]) / (cycle.mesh[j + 1] - cycle.mesh[j]))
 }

@@ -70,7 +70,11 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
 
 /// Monitors along a branch on which quantities are held, in several parameters: a turning point of one of them is not a
 /// bifurcation, so the spectrum alone decides. Folds and branch points are distinguished afterwards.
-pub fn monitors_of_held_quantities(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
+pub fn monitors_of_held_quantities(family: Family, symmetric: bool, free: usize) -> Vec<Box<dyn Monitor>> {
+    // Boundary-value problems have no stability that a turning point in a further parameter would change.
+    if family == Family::Arc {
+        return vec![Box::new(fold::Turn { free })];
+    }
     let mut all = monitors(family, symmetric);
     all.retain(|monitor| !matches!(monitor.kind(), Kind::Fold | Kind::BranchPoint));
     all.insert(0, Box::new(fold::Passage { symmetric }));

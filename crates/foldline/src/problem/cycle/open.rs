@@ -270,9 +270,12 @@ impl CycleProblem<'_> {
         sizes
     }
 
-    /// Errors of y / |y| on every interval, and the relative error of |y|, both estimated like those of the solution.
+    /// Errors of y / |y| on every interval, and the relative error of |y|, both estimated like those of the solution. y satisfies
+    /// the variational equation along the profile of the last factorisation; along a later one its defect would be that of the
+    /// Newton step between them, which no mesh reduces.
     pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64) {
         let (y, share) = self.response();
+        let u = if self.factorised_at.is_empty() { u } else { &self.factorised_at[..] };
         let (n, size, count) = (self.n, self.profile_size(), self.intervals());
         let parameters = self.setting.at(&u[size + 1..]);
         let field = Varied { field: self.setting.field, change: self.setting.spread(&y[size + 1..]) };
