@@ -103,9 +103,11 @@ pub(super) fn read(
     if let Start::EndOf(parent) | Start::EndOfSwitched(parent, _) = &start {
         let sought = holds.levels.iter().filter(|level| level.value.is_finite());
         let sought: Vec<Mark> = sought.map(|level| Mark::at(level.quantity, level.value, false)).collect();
-        let marks = &mut ground.items.branches[*parent].marks;
+        let BranchPlan { marks, holds: kept, .. } = &mut ground.items.branches[*parent];
         for mark in sought {
-            if !marks.iter().any(|own| own.quantity == mark.quantity && own.value == mark.value) {
+            // What the parent holds too does not change along it.
+            let constant = kept.levels.iter().any(|level| level.quantity == mark.quantity);
+            if !constant && !marks.iter().any(|own| own.quantity == mark.quantity && own.value == mark.value) {
                 marks.push(mark);
             }
         }

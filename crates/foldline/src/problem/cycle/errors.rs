@@ -330,13 +330,14 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         let mut errors: Vec<f64> = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        let mut degeneracy = 0.0;
+        let (mut degeneracy, mut amplified) = (0.0, gain);
         if self.is_open() && self.setting.field.saddles(&parameters).is_none() {
-            let (others, off) = self.errors_of_response(u, &scale);
+            let (others, off, growth) = self.errors_of_response(u, &scale);
             errors.iter_mut().zip(others).for_each(|(own, other)| *own = own.max(other));
             degeneracy = off;
+            amplified = amplified.max(growth);
         }
-        let rounding = ROUNDING * self.intervals() as f64 * gain;
+        let rounding = ROUNDING * self.intervals() as f64 * amplified;
         Measured { at: u.to_vec(), errors, rounding, shift, within, degeneracy }
     }
 

@@ -18,7 +18,6 @@ impl CycleProblem<'_> {
         self.measured.replace(None);
         self.local = None;
         self.anchored.clear();
-        self.factorised_at.clear();
         self.unphased = false;
         let (n, count, mesh) = (self.n, self.intervals(), &self.mesh);
         self.system.resize(count);

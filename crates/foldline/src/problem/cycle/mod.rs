@@ -105,8 +105,6 @@ pub struct CycleProblem<'a> {
     /// X̃ with its scalars; empty if there is none on this mesh. Below, true if `phase` must still be computed from it.
     anchored: Vec<f64>,
     unphased: bool,
-    /// Unknowns of a boundary-value problem at the last factorisation.
-    factorised_at: Vec<f64>,
     scale: Vec<f64>,
     period_scale: f64,
     /// Sizes of the unknowns λ in the inner product: 1, or 1 + |λ| of those that conditions determine.
@@ -176,7 +174,6 @@ impl<'a> CycleProblem<'a> {
             phase_offset: 0.0,
             anchored: Vec::new(),
             unphased: false,
-            factorised_at: Vec::new(),
             period_scale: 1.0,
             states: Vec::new(),
             ends: Vec::new(),
@@ -229,7 +226,6 @@ impl<'a> CycleProblem<'a> {
             phase_offset,
             anchored,
             unphased,
-            factorised_at,
             scale,
             period_scale,
             axis_scales,
@@ -267,7 +263,6 @@ impl<'a> CycleProblem<'a> {
             phase_offset,
             anchored,
             unphased,
-            factorised_at,
             scale,
             period_scale,
             axis_scales,
@@ -650,10 +645,6 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.linearise(u);
-        if self.is_open() {
-            self.factorised_at.clear();
-            self.factorised_at.extend_from_slice(u);
-        }
         self.lay_phase();
         self.local = self.localised(u, rows);
         if self.local.is_some() {

@@ -34,6 +34,7 @@ use crate::linalg::ends::Ends;
 use crate::linalg::lane::Lane;
 use crate::linalg::system::{System, either};
 use crate::problem::defect::Defect;
+use crate::problem::gauss::Scheme;
 use crate::problem::piecewise::OneBranch;
 use num_complex::Complex64;
 
@@ -270,15 +271,16 @@ impl CycleProblem<'_> {
         sizes
     }
 
-    /// Errors of y / |y| on every interval, and the relative error of |y|, both estimated like those of the solution. y satisfies
-    /// the variational equation along the profile of the last factorisation; along a later one its defect would be that of the
-    /// Newton step between them, which no mesh reduces.
-    pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64) {
+    /// Errors of y / |y| on every interval, the relative error of |y|, both estimated like those of the solution, and the factor by
+    /// which defects on single intervals grow.
+    pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64, f64) {
         let (y, share) = self.response();
-        let u = if self.factorised_at.is_empty() { u } else { &self.factorised_at[..] };
         let (n, size, count) = (self.n, self.profile_size(), self.intervals());
         let parameters = self.setting.at(&u[size + 1..]);
-        let field = Varied { field: self.setting.field, change: self.setting.spread(&y[size + 1..]) };
+        let change = self.setting.spread(&y[size + 1..]);
+        let own = Varied { field: self.setting.field, change, remaining: None };
+        let remaining = self.remaining(u, &y, &own);
+        let field = Varied { remaining: Some(Remaining { mesh: &self.mesh, scheme: &self.scheme, values: remaining }), ..own };
         let both = u[..size].chunks_exact(n).zip(y.chunks_exact(n));
         let profile: Vec<f64> = both.flat_map(|(x, y)| x.iter().chain(y)).copied().collect();
         let sizes = [scale, scale].concat();
@@ -305,7 +307,7 @@ impl CycleProblem<'_> {
             let mut missed = vec![0.0; n];
             for part in &own.parts {
                 let branch = OneBranch { field: self.setting.field, signs: &part.signs };
-                let field = Varied { field: &branch, change: field.change.clone() };
+                let field = Varied { field: &branch, change: field.change.clone(), remaining: None };
                 let along = part.by.chunks_exact(direction.len()).map(|row| dot(row, &direction)).collect::<Vec<f64>>();
                 let both = part.nodes.chunks_exact(n).zip(along.chunks_exact(n));
                 let nodes: Vec<f64> = both.flat_map(|(x, y)| x.iter().chain(y)).copied().collect();
@@ -331,7 +333,38 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let aside = self.dot(&shift, &shift).sqrt();
         let gain = aside.max(off) / largest;
-        (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), along.abs())
+        (local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect(), along.abs(), gain)
+    }
+
+    /// `[N][m][n]`: what remains of y' - f_x y - f_λ y_λ at the collocation points. y belongs to the last factorisation, and the
+    /// matrix may have changed since by a Newton step. No mesh reduces this part of the defect, which is no error of discretisation.
+    fn remaining(&self, u: &[f64], y: &[f64], field: &Varied) -> Vec<f64> {
+        let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), self.intervals());
+        let lanes = count * m;
+        let (mut states, mut times) = (vec![0.0; 2 * n * lanes], vec![0.0; lanes]);
+        for (lane, (j, i)) in (0..lanes).map(|lane| (lane, (lane / m, lane % m))) {
+            times[lane] = f64::from(self.forcing_periods) * (self.mesh[j] + self.h(j) * self.scheme.nodes[i + 1]);
+            for c in 0..n {
+                let at = j * block + (i + 1) * n + c;
+                states[c * lanes + lane] = u[at];
+                states[(n + c) * lanes + lane] = y[at];
+            }
+        }
+        let parameters = self.setting.at(&u[self.profile_size() + 1..]);
+        let at =
+            Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
+        let mut rates = vec![0.0; 2 * n * lanes];
+        field.evaluate(at, &mut rates);
+        let mut left = vec![0.0; lanes * n];
+        for (lane, (j, i)) in (0..lanes).map(|lane| (lane, (lane / m, lane % m))) {
+            let slopes = &self.scheme.derivative[i * (m + 1)..(i + 1) * (m + 1)];
+            for c in 0..n {
+                let rise: f64 = slopes.iter().enumerate().map(|(k, d)| d * y[j * block + k * n + c]).sum();
+                let rate = rise / (self.h(j) * u[self.profile_size()]);
+                left[lane * n + c] = rate - rates[(n + c) * lanes + lane];
+            }
+        }
+        left
     }
 
     /// Copies of a point under a symmetry; see [`ZeroProblem::images`].
@@ -359,11 +392,38 @@ impl CycleProblem<'_> {
     }
 }
 
-/// A field with its variational equation: x' = f(x, p), y' = f_x y + f_p `change`, in the states (x, y).
+/// A field with its variational equation: x' = f(x, p), y' = f_x y + f_p `change` + g(t), in the states (x, y).
 struct Varied<'a> {
     field: &'a dyn VectorField,
     /// `[k]`: the change of all parameters that belongs to y.
     change: Vec<f64>,
+    /// g, with which y satisfies the equation at the collocation points.
+    remaining: Option<Remaining<'a>>,
+}
+
+/// The polynomials on the intervals through [`CycleProblem::remaining`].
+struct Remaining<'a> {
+    mesh: &'a [f64],
+    scheme: &'a Scheme,
+    values: Vec<f64>,
+}
+
+impl Remaining<'_> {
+    /// Adds the polynomials to `f` `[n × lanes]` at given times, from 0 to 1.
+    fn add(&self, times: &[f64], f: &mut [f64]) {
+        let (m, lanes) = (self.scheme.degree, times.len());
+        let (n, nodes) = (f.len() / lanes.max(1), &self.scheme.nodes[1..]);
+        for (lane, t) in times.iter().enumerate() {
+            let j = self.mesh.partition_point(|end| end <= t).clamp(1, self.mesh.len() - 1) - 1;
+            let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
+            for (i, own) in nodes.iter().enumerate() {
+                let others = nodes.iter().enumerate().filter(|(k, _)| *k != i);
+                let weight: f64 = others.map(|(_, other)| (s - other) / (own - other)).product();
+                let values = &self.values[(j * m + i) * n..(j * m + i + 1) * n];
+                (0..n).for_each(|c| f[c * lanes + lane] += weight * values[c]);
+            }
+        }
+    }
 }
 
 impl VectorField for Varied<'_> {
@@ -387,6 +447,9 @@ impl VectorField for Varied<'_> {
         self.field.evaluate(batch, own);
         let along: Vec<f64> = y.iter().copied().chain(self.change.iter().flat_map(|p| vec![*p; at.lanes])).collect();
         self.field.directional(batch, &[&along], varied);
+        if let Some(remaining) = &self.remaining {
+            remaining.add(at.times, varied);
+        }
     }
 
     // Only values are asked for.
