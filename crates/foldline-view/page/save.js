@@ -16,6 +16,21 @@ export function saveSvg(run, diagram) {
   download(`${fileName(run, diagram)}.svg`, diagram.chart.svg(run.about.model.name), "image/svg+xml");
 }
 
+export function savePdf(run, diagram) {
+  download(`${fileName(run, diagram)}.pdf`, diagram.chart.pdf(), "application/pdf");
+}
+
+/** Place in the page that the server sends at which the view is inserted. */
+const DATA = '<script type="application/json" id="data-run">';
+
+/** Saves the whole page with its data, so that it opens without a server; it shows the view of now. */
+export async function savePage(run) {
+  const page = await run.source.page();
+  const view = `<script type="application/json" id="data-view">${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}</script>\n`;
+  const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
+  download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(DATA, () => view + DATA), "text/html");
+}
+
 export async function savePng(run, diagram) {
   const image = await diagram.chart.png();
   if (image) download(`${fileName(run, diagram)}.png`, image, "image/png");
