@@ -20,6 +20,7 @@ use foldline_plot::spectrogram::Spectrum;
 use foldline_plot::theme::Theme;
 use foldline_plot::waterfall::Waterfall;
 use foldline_plot::{Axis, Figure, LegendPlace, Panel, Picture, Quantity, orbits, profile, spectra, spectrogram, waterfall};
+use foldline_store::nearest::suggest;
 use foldline_store::study_file::{FigurePlan, PanelPlan, Show};
 use std::sync::atomic::Ordering;
 
@@ -175,11 +176,16 @@ impl Page<'_> {
             return Ok(if model.outputs.is_empty() { 0 } else { model.states.len() });
         };
         profile::channel(model, name).ok_or_else(|| {
-            let names = model.states.iter().map(|own| &own.name).chain(model.outputs.iter().map(|own| &own.name));
-            let names: Vec<&str> = names.map(String::as_str).collect();
             let message = format!("y = {name}: this picture shows a state or an output");
-            Failure::typed(message, format!("one of: {}", names.join(", ")))
+            Failure::typed(message, format!("one of: {}", self.channels().join(", ")))
         })
+    }
+
+    /// Names of states and outputs.
+    fn channels(&self) -> Vec<&str> {
+        let model = self.model();
+        let states = model.states.iter().map(|own| own.name.as_str());
+        states.chain(model.outputs.iter().map(|own| own.name.as_str())).collect()
     }
 
     /// Branches of the panel.
@@ -301,7 +307,13 @@ impl Page<'_> {
         }
         let channel = self.channel()?;
         let plane = match &self.own.section {
-            Some((name, level)) => Plane::Level(profile::channel(model, name).unwrap_or(0), *level),
+            Some((name, level)) => {
+                let index = profile::channel(model, name).ok_or_else(|| {
+                    let message = format!("--section: the model has no state or output `{name}`");
+                    Failure::typed(message, suggest(name, &self.channels()))
+                })?;
+                Plane::Level(index, *level)
+            }
             None if model.forced() => Plane::Stroboscopic,
             None => {
                 let cure = format!("give a level that the motions pass, such as --section {}=0", model.states[0].name);

@@ -109,7 +109,7 @@ pub fn section_panel(
     let [wide, high] = picture.window.map_or([None, None], |[x0, x1, y0, y1]| [Some([x0, x1]), Some([y0, y1])]);
     let place = match plane {
         Plane::Stroboscopic => "at the start of a forcing period".to_string(),
-        Plane::Level(of, level) => format!("where {} = {level}", name(model, of)),
+        Plane::Level(of, level) => format!("where {} rises through {level}", name(model, of)),
     };
     let x = Axis { range: wide, log: picture.log[0], ..Axis::new(label(x, model)) };
     let y = Axis { range: high, log: picture.log[1], ..Axis::new(format!("{} {place}", channel_label(model, channel))) };

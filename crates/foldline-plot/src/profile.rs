@@ -1,5 +1,6 @@
 //! States and outputs along stored profiles.
 
+use foldline::contract::VectorField;
 use foldline::diagram::{Cycle, Point, Solution};
 use foldline::explore::course::outputs;
 use foldline::model::Model;
@@ -24,7 +25,7 @@ pub fn along(model: &Model, point: &Point) -> Option<(Vec<f64>, Vec<Vec<f64>>)> 
 pub fn stroboscopic(model: &Model, point: &Point) -> Option<Vec<Vec<f64>>> {
     match &point.solution {
         Solution::Equilibrium(state) => {
-            let own = outputs(model, state, &point.parameters, if model_forced(model) { &[0.0] } else { &[] });
+            let own = outputs(model, state, &point.parameters, if model.forced() { &[0.0] } else { &[] });
             Some(state.iter().chain(&own).map(|value| vec![*value]).collect())
         }
         _ => {
@@ -58,11 +59,6 @@ pub fn crossings(model: &Model, point: &Point, channel: usize, level: f64) -> Op
     Some(at(model, point, cycle, &found))
 }
 
-fn model_forced(model: &Model) -> bool {
-    use foldline::contract::VectorField;
-    model.forced()
-}
-
 /// The cycle of a point, if its profile was stored.
 pub fn cycle_of(point: &Point) -> Option<&Cycle> {
     match &point.solution {
@@ -82,8 +78,8 @@ pub fn at(model: &Model, point: &Point, cycle: &Cycle, times: &[f64]) -> Vec<Vec
         states[last..].copy_from_slice(&first);
     }
     let clock: Vec<f64> = times.iter().map(|time| time * f64::from(cycle.forcing_periods)).collect();
-    let own = outputs(model, &states, &point.parameters, if model_forced(model) { &clock } else { &[] });
-    let m = own.len().checked_div(times.len()).unwrap_or(0);
+    let own = outputs(model, &states, &point.parameters, if model.forced() { &clock } else { &[] });
+    let m = model.outputs.len();
     let state = (0..n).map(|k| states.iter().skip(k).step_by(n.max(1)).copied().collect());
     let output = (0..m).map(|k| own.iter().skip(k).step_by(m.max(1)).copied().collect());
     state.chain(output).collect()

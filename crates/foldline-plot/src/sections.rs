@@ -1,6 +1,6 @@
 //! Stroboscopic and Poincaré points over a parameter: of the solutions on branches, and of motions found by simulation.
 
-use crate::branches::root;
+use crate::branches::{LIGHTER, root};
 use crate::curve::line_of;
 use crate::figure::{Layer, Marker, Shape};
 use crate::palette::nth;
@@ -30,14 +30,15 @@ pub fn branch_layers(diagram: &Diagram, model: &Model, x: Quantity, channel: usi
     };
     let mut layers = Vec::new();
     for branch in diagram.branches.iter().filter(|branch| branch.held.is_none()) {
-        let own = root(diagram, branch).0.name.as_str();
-        let colour = nth(roots.iter().position(|name| *name == own).unwrap_or(0));
+        let (own, depth) = root(diagram, branch);
+        let colour = nth(roots.iter().position(|name| *name == own.name).unwrap_or(0));
+        let named = |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.faint(0.65).named(LIGHTER) };
         let values = |point: &Point| match plane {
             Plane::Stroboscopic => stroboscopic(model, point),
             Plane::Level(of, level) => crossings(model, point, of, level),
         };
         match plane {
-            Plane::Stroboscopic => layers.extend(lines(branch, x, channel, colour, values)),
+            Plane::Stroboscopic => layers.extend(lines(branch, x, channel, colour, values).into_iter().map(named)),
             Plane::Level(..) => {
                 let places = branch.points.iter().filter_map(|point| {
                     let at = drawn(x, point)?;
@@ -45,7 +46,7 @@ pub fn branch_layers(diagram: &Diagram, model: &Model, x: Quantity, channel: usi
                 });
                 let layer = Layer::scatter(places.flatten().collect(), Marker::Dot, colour).wide(1.6);
                 if !layer.is_empty() {
-                    layers.push(layer.named(branch.name.clone()));
+                    layers.push(named(layer));
                 }
             }
         }
@@ -68,8 +69,7 @@ fn lines(
         let shape = Shape::Curve { stretches, rounded: true, stability: true };
         Layer { shape, ..Layer::curve(&[], colour) }.wide(1.6)
     };
-    let layers = (0..periods as usize).map(of).filter(|layer| !layer.is_empty());
-    layers.map(|layer| layer.named(branch.name.clone())).collect()
+    (0..periods as usize).map(of).filter(|layer| !layer.is_empty()).collect()
 }
 
 /// Layers of clouds, in colours after `taken` others: small dots behind the branches.

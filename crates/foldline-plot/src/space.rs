@@ -160,6 +160,8 @@ impl Space {
         let [lx, ly] = left.unwrap_or([bx, fy]);
         const TICK: f64 = 0.16;
         const NAME: f64 = 0.44;
+        // Width of a letter: the box is some 2.8 wide, on which about a hundred letters fit.
+        const LETTER: f64 = 0.028;
         let mut texts = Vec::new();
         for axis in 0..3 {
             let place = |s: f64, away: f64| -> [f64; 2] {
@@ -178,8 +180,9 @@ impl Space {
                     texts.push(Layer::text(place(s, TICK), text.as_str()));
                 }
             }
-            // Below the ticks of the floor; above those of the third axis.
-            let name = if axis == 2 { place(1.22, 0.06) } else { place(0.0, NAME) };
+            // Below the ticks of the floor; above those of the third axis, left of the face behind it.
+            let half = LETTER * 0.5 * self.labels[axis].chars().count() as f64;
+            let name = if axis == 2 { place(1.2, half - 0.05) } else { place(0.0, NAME) };
             texts.push(Layer::text(name, self.labels[axis].clone()).coloured(GREY));
         }
         let all = [-1.0, 1.0].into_iter().flat_map(|x| [-1.0, 1.0].map(|y| [x, y]));

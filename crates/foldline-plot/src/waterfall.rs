@@ -1,6 +1,6 @@
 //! Waterfalls: profiles or amplitudes of harmonics of the cycles of a branch, one behind the other along a parameter.
 
-use crate::figure::{Axis, Panel};
+use crate::figure::{Axis, Panel, Shape};
 use crate::palette::{BLUE, GREY};
 use crate::profile::{along, channel_label, cycle_of};
 use crate::quantity::{drawn, label};
@@ -82,9 +82,14 @@ pub fn panel(
                 let stems: Vec<Vec<([f64; 3], bool)>> = line
                     .into_iter()
                     .filter(|place| place[2] > floor)
-                    .map(|place| vec![([place[0], at, floor], stable), (place, stable)])
+                    .map(|place| vec![([place[0], at, floor], true), (place, true)])
                     .collect();
-                panel.layers.push(space.curve(&stems, if stable { BLUE } else { GREY }).wide(1.6));
+                let (colour, name) = if stable { (BLUE, "stable") } else { (GREY, "unstable") };
+                let mut layer = space.curve(&stems, colour).wide(1.6).named(name);
+                if let Shape::Curve { stability, .. } = &mut layer.shape {
+                    *stability = false;
+                }
+                panel.layers.push(layer);
             }
         }
     }
