@@ -94,7 +94,9 @@ const BEADS: [Marker; 7] = [
 pub fn black(mut figure: Figure) -> Figure {
     let mut seen: Vec<&'static str> = Vec::new();
     for layer in figure.panels.iter_mut().flat_map(|panel| &mut panel.layers) {
-        if matches!(layer.shape, Shape::Curve { .. }) && ![GREY, PALE].contains(&layer.colour) {
+        // The lines of sweeps have no names; marks tell them apart already.
+        let named = layer.name.is_some() && matches!(layer.shape, Shape::Curve { .. });
+        if named && ![GREY, PALE].contains(&layer.colour) {
             let index = seen.iter().position(|own| *own == layer.colour).unwrap_or_else(|| {
                 seen.push(layer.colour);
                 seen.len() - 1

@@ -26,7 +26,8 @@ const DATA = '<script type="application/json" id="data-run">';
 /** Saves the whole page with its data, so that it opens without a server; it shows the view of now. */
 export async function savePage(run) {
   const page = await run.source.page();
-  const view = `<script type="application/json" id="data-view">${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}</script>\n`;
+  // The end of an element may not stand in a script that is part of a page.
+  const view = `<script type="application/json" id="data-view">${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}<\/script>\n`;
   const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
   download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(DATA, () => view + DATA), "text/html");
 }

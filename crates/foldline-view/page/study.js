@@ -169,6 +169,8 @@ export class Desk {
     const at = branch && { branch: place.branch, position: place.position, special: place.special };
     const press = (text, label, action, free) => button(text, label, () => this.act(at, action, free ? this.free : undefined));
     const found = [];
+    const verify = button("Verify", "Recompute this point by an independent method", () => this.verify(at));
+    if (this.fixed !== null) return [verify];
     if (special && !isCurve && LEAVING.includes(special.kind)) found.push(press("Switch here", "Follow the branch that leaves here", "switch"));
     const inOther = parameters.length > 0 && !isCurve;
     if (inOther) {
@@ -182,7 +184,7 @@ export class Desk {
       found.push(press("Sweep ↓", "Simulate at decreasing values of the parameter, from here", "down"));
     }
     found.push(press("Attractors", "Sample initial states at this value of the parameter", "survey"));
-    found.push(button("Verify", "Recompute this point by an independent method", () => this.verify(at)));
+    found.push(verify);
     return found;
   }
 
@@ -220,7 +222,7 @@ export class Desk {
     const key = branch ? JSON.stringify([branch.id, place.special, branch.special[place.special]?.kind, branch.about.held, this.fixed]) : "";
     if (key === this.offered) return;
     this.offered = key;
-    host.hidden = !branch || this.fixed !== null;
+    host.hidden = !branch;
     host.replaceChildren(...(host.hidden ? [] : [make("span", { class: "lead", text: "From here:" }), ...this.actions(branch, place)]));
   }
 }

@@ -75,6 +75,11 @@ mod tests {
     use super::{joined, script};
 
     #[test]
+    fn the_script_does_not_end_the_element_that_contains_it() {
+        assert!(!script().to_lowercase().contains("</script"));
+    }
+
+    #[test]
     fn imports_and_exports_disappear() {
         let module = "import { a,\n  b } from \"./x.js\";\nexport function f() {\n  return a;\n}\nimport { c } from \"./y.js\";\n";
         assert_eq!(joined(module), "function f() {\n  return a;\n}\n");

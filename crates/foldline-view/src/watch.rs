@@ -178,6 +178,8 @@ impl Watch {
     /// Notes whether the page can go on with a longer study, or why it cannot.
     pub fn editable(&self, can: Result<(), String>) {
         *self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner) = can.err();
+        // The state of a finished run, which was read before, says so too.
+        self.growing().stamp = None;
     }
 
     /// Reason why the page cannot go on with a longer study, if there is one.
@@ -381,14 +383,20 @@ impl Watch {
                 None => return Ok(None),
             },
             Place::Special(index) => match reading.special_point(branch, index)? {
-                Some(special) => alone.insert_special(special),
+                Some(special) => {
+                    // The point before it carries the parameters that do not vary; it is not recomputed itself.
+                    let Some(before) = reading.point(branch, special.point.position)? else { return Ok(None) };
+                    alone.insert(before);
+                    alone.insert_special(special);
+                }
                 None => return Ok(None),
             },
         }
         drop(reading);
+        let sample = matches!(place, Place::Special(_)).then_some(0);
         let diagram = Diagram { branches: vec![alone], ..Diagram::default() };
         let system = System::of_plan(&study.model, &study.plan);
-        Ok(Some(verify(&system, &diagram, study.plan.tolerance, None, &|_| true)))
+        Ok(Some(verify(&system, &diagram, study.plan.tolerance, sample, &|_| true)))
     }
 
     fn growing(&self) -> MutexGuard<'_, Growing> {
