@@ -66,7 +66,7 @@ pub enum Command {
     /// Show a run in the browser, also while it is computed
     View(View),
     /// Draw the bifurcation diagram of a run
-    Plot(Plot),
+    Plot(Box<Plot>),
     /// Export a run as CSV, Parquet or NetCDF, or as a page for a browser
     Export(Export),
     /// List the solutions in AUTO-07p files, or write a study that starts from them

@@ -19,7 +19,9 @@ use foldline_plot::space::View;
 use foldline_plot::spectrogram::Spectrum;
 use foldline_plot::theme::Theme;
 use foldline_plot::waterfall::Waterfall;
-use foldline_plot::{Axis, Figure, LegendPlace, Panel, Picture, Quantity, orbits, profile, spectra, spectrogram, waterfall};
+use foldline_plot::{
+    Axis, Figure, LegendPlace, Panel, Picture, Quantity, orbits, profile, spectra, spectrogram, waterfall,
+};
 use foldline_store::nearest::suggest;
 use foldline_store::study_file::{FigurePlan, PanelPlan, Show};
 use std::sync::atomic::Ordering;
@@ -90,13 +92,7 @@ pub fn drawn(figure: &FigurePlan, run: &Run, plain: bool) -> Result<(String, Out
     }
     let theme = figure.theme.as_deref().and_then(Theme::named).unwrap_or_default();
     let width = figure.size.map_or(960.0, |[width, _]| width);
-    let drawn = Figure {
-        title: figure.title.clone(),
-        panels,
-        columns: figure.columns,
-        width,
-        legend: !single,
-    };
+    let drawn = Figure { title: figure.title.clone(), panels, columns: figure.columns, width, legend: !single };
     Ok((figure_in(drawn, theme), outcome))
 }
 
@@ -211,7 +207,9 @@ impl Page<'_> {
     fn in_units_of_the_model(&self, what: &str) -> Result<(), Failure> {
         match self.plain {
             true => Ok(()),
-            false => Err(Failure::typed(format!("--unit: {what} are drawn in the units of the model"), "leave out --unit")),
+            false => {
+                Err(Failure::typed(format!("--unit: {what} are drawn in the units of the model"), "leave out --unit"))
+            }
         }
     }
 
@@ -234,7 +232,11 @@ impl Page<'_> {
         if plane.is_none() {
             // Curves in two parameters lie in the same space if two of the axes are parameters.
             diagram = self.selected()?;
-            let axes = [picture.x.unwrap_or_else(|| default_x(&diagram)), picture.y.unwrap_or_else(|| default_y(self.model())), z];
+            let axes = [
+                picture.x.unwrap_or_else(|| default_x(&diagram)),
+                picture.y.unwrap_or_else(|| default_y(self.model())),
+                z,
+            ];
             let shows = |k: usize| axes.contains(&Quantity::Parameter(k));
             diagram.branches.retain(|own| match own.held {
                 Some((_, follows)) => shows(own.free) && shows(follows),
@@ -249,7 +251,10 @@ impl Page<'_> {
         let x = self.axis(0)?.unwrap_or_else(|| default_x(&diagram));
         let (panels, outside) = spectra::panels(&diagram, self.model(), x, self.own.log[1]);
         if panels[0].layers.iter().all(|layer| layer.name.is_none()) {
-            return Err(Failure::typed("there is no branch with multipliers or eigenvalues to show", "select others with --branch"));
+            return Err(Failure::typed(
+                "there is no branch with multipliers or eigenvalues to show",
+                "select others with --branch",
+            ));
         }
         if outside > 0 {
             report(format_args!("note: {outside} values lie outside the plane of the multipliers"))?;
@@ -268,7 +273,10 @@ impl Page<'_> {
             _ => model.whirl.unwrap_or([0, 1.min(model.states.len() + model.outputs.len() - 1)]).map(Some),
         };
         let [Some(a), Some(b)] = plane else {
-            return Err(Failure::typed("orbits have a state or an output on each axis", "name two of them with --x and --y"));
+            return Err(Failure::typed(
+                "orbits have a state or an output on each axis",
+                "name two of them with --x and --y",
+            ));
         };
         let axes = [Quantity::Parameter(branch.free), default_y(model)];
         let count = self.own.count.unwrap_or(ORBITS);
@@ -286,7 +294,10 @@ impl Page<'_> {
         let count = self.own.count.unwrap_or(PROFILES);
         let found = waterfall::panel(branch, self.model(), what, x, self.channel()?, count, self.view());
         let mut panel = found.ok_or_else(|| {
-            Failure::typed(format!("{} has fewer than two stored cycles", branch.name), "select another branch with --branch")
+            Failure::typed(
+                format!("{} has fewer than two stored cycles", branch.name),
+                "select another branch with --branch",
+            )
         })?;
         panel.title.clone_from(&branch.name);
         Ok(panel)
@@ -303,7 +314,10 @@ impl Page<'_> {
         self.in_units_of_the_model("sections")?;
         let model = self.model();
         if model.iterated() {
-            return Err(Failure::typed("a map has no sections: its iterates are drawn", "leave out --strobe and --section"));
+            return Err(Failure::typed(
+                "a map has no sections: its iterates are drawn",
+                "leave out --strobe and --section",
+            ));
         }
         let channel = self.channel()?;
         let plane = match &self.own.section {
@@ -341,14 +355,18 @@ impl Page<'_> {
             let (points, early) = self.cloud(set, plane, channel, count);
             if early > 0 {
                 short = true;
-                report(format_args!("incomplete: {early} motions of {} could not be followed through {count} points", set.name))?;
+                report(format_args!(
+                    "incomplete: {early} motions of {} could not be followed through {count} points",
+                    set.name
+                ))?;
             }
             clouds.push(Cloud { name: set.name.clone(), points });
         }
         let mut panel = section_panel(&diagram, model, &picture, channel, plane, &clouds);
         panel.height = 420.0;
         if panel.layers.is_empty() {
-            let cure = "the study needs a survey or sweep over the parameter on the horizontal axis, or a branch of cycles";
+            let cure =
+                "the study needs a survey or sweep over the parameter on the horizontal axis, or a branch of cycles";
             return Err(Failure::typed("there are no points in this section", cure));
         }
         Ok((vec![panel], short))
@@ -385,10 +403,13 @@ impl Page<'_> {
         let channel = self.channel()?;
         let x = match self.axis(0)? {
             Some(x) => x,
-            None => self.run.diagram.responses.first().map_or(Quantity::Parameter(0), |set| Quantity::Parameter(set.free)),
+            None => {
+                self.run.diagram.responses.first().map_or(Quantity::Parameter(0), |set| Quantity::Parameter(set.free))
+            }
         };
         let none = || {
-            let cure = "the study needs a `[[sweep]]` or `[[survey]]` with several values; --branch selects one of them";
+            let cure =
+                "the study needs a `[[sweep]]` or `[[survey]]` with several values; --branch selects one of them";
             Failure::typed("there is no survey or sweep whose spectra could be shown", cure)
         };
         let set = *self.simulated(x).first().ok_or_else(none)?;

@@ -120,9 +120,7 @@ fn asked(typed: &Typed) -> Result<Option<FigurePlan>, Failure> {
         view: typed.view.as_deref().map(view).transpose()?,
         ..PanelPlan::default()
     };
-    let zoomed = |text: &String| {
-        Ok(PanelPlan { window: Some(window("zoom", text)?), span: 1, ..first.clone() })
-    };
+    let zoomed = |text: &String| Ok(PanelPlan { window: Some(window("zoom", text)?), span: 1, ..first.clone() });
     let zooms: Vec<PanelPlan> = typed.zoom.iter().map(zoomed).collect::<Result<_, Failure>>()?;
     let columns = match show {
         Show::Orbits => 3,
@@ -191,15 +189,19 @@ fn size(typed: &Typed) -> Result<Option<[f64; 2]>, Failure> {
 
 /// State or output, and level.
 fn level(text: &str) -> Result<(String, f64), Failure> {
-    let found = text.split_once('=').and_then(|(name, level)| Some((name.trim().to_string(), level.trim().parse().ok()?)));
+    let found =
+        text.split_once('=').and_then(|(name, level)| Some((name.trim().to_string(), level.trim().parse().ok()?)));
     let cure = "give a state or output and a number, such as --section x=0";
-    found.filter(|(_, level): &(String, f64)| level.is_finite()).ok_or_else(|| Failure::typed(format!("--section {text}: not a level"), cure))
+    found
+        .filter(|(_, level): &(String, f64)| level.is_finite())
+        .ok_or_else(|| Failure::typed(format!("--section {text}: not a level"), cure))
 }
 
 /// Angles of a view.
 fn view(text: &str) -> Result<[f64; 2], Failure> {
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-    let found = text.split_once(',').and_then(|(a, e)| Some([number(a)?, number(e).filter(|e| (0.0..=90.0).contains(e))?]));
+    let found =
+        text.split_once(',').and_then(|(a, e)| Some([number(a)?, number(e).filter(|e| (0.0..=90.0).contains(e))?]));
     let cure = "give two angles in degrees, the second from 0 to 90, such as --view -60,25";
     found.ok_or_else(|| Failure::typed(format!("--view {text}: not a direction"), cure))
 }
@@ -323,7 +325,10 @@ fn window(option: &str, text: &str) -> Result<[f64; 4], Failure> {
     match numbers.as_deref() {
         Ok([x0, x1, y0, y1]) if [x0, x1, y0, y1].iter().all(|v| v.is_finite()) => {
             if x0 >= x1 || y0 >= y1 {
-                return Err(Failure::typed(format!("--{option} {text}: a range is empty or the wrong way round"), cure));
+                return Err(Failure::typed(
+                    format!("--{option} {text}: a range is empty or the wrong way round"),
+                    cure,
+                ));
             }
             Ok([*x0, *x1, *y0, *y1])
         }

@@ -47,7 +47,8 @@ fn chosen(branch: &Branch, axes: [Quantity; 2], count: usize) -> Vec<(&Point, Op
         let close = |i: &usize| (lengths[*i] - target).abs();
         let near = (0..all.len()).filter(|i| all[*i].1.is_some() && close(i) < 0.5 * part && !found.contains(i));
         let best = near.min_by(|a, b| close(a).total_cmp(&close(b)));
-        let best = best.or_else(|| (0..all.len()).filter(|i| !found.contains(i)).min_by(|a, b| close(a).total_cmp(&close(b))));
+        let best =
+            best.or_else(|| (0..all.len()).filter(|i| !found.contains(i)).min_by(|a, b| close(a).total_cmp(&close(b))));
         found.extend(best);
     }
     found.sort_unstable();
@@ -95,7 +96,9 @@ pub fn panels(
             && let Some(points) = stroboscopic(model, point)
         {
             let starts = points[across].iter().zip(&points[up]).map(|(a, b)| [*a, *b]).collect();
-            panel.layers.push(Layer::scatter(starts, Marker::Circle, VERMILION).wide(2.2).named("start of a forcing period"));
+            panel
+                .layers
+                .push(Layer::scatter(starts, Marker::Circle, VERMILION).wide(2.2).named("start of a forcing period"));
         }
         (panel.height, panel.equal) = (250.0, whirl);
         panels.push(panel);

@@ -68,7 +68,10 @@ fn with_values<const N: usize>(
         branch.points.iter_mut().chain(special).for_each(|point| append(point, &axes, model));
     }
     let mut own = axes;
-    own.iter_mut().enumerate().filter(|(_, axis)| axis.needs_profile()).for_each(|(k, axis)| *axis = appended(k, model));
+    own.iter_mut()
+        .enumerate()
+        .filter(|(_, axis)| axis.needs_profile())
+        .for_each(|(k, axis)| *axis = appended(k, model));
     (Some(diagram), own)
 }
 
@@ -112,7 +115,8 @@ pub fn section_panel(
         Plane::Level(of, level) => format!("where {} rises through {level}", name(model, of)),
     };
     let x = Axis { range: wide, log: picture.log[0], ..Axis::new(label(x, model)) };
-    let y = Axis { range: high, log: picture.log[1], ..Axis::new(format!("{} {place}", channel_label(model, channel))) };
+    let y =
+        Axis { range: high, log: picture.log[1], ..Axis::new(format!("{} {place}", channel_label(model, channel))) };
     Panel { layers, ..Panel::new("", "", x, y) }
 }
 
@@ -141,7 +145,8 @@ pub fn space_panel(diagram: &Diagram, model: &Model, picture: &Picture, z: Quant
     let all: Vec<[f64; 3]> = of_branches.chain(diagram.responses.iter().flat_map(motions)).collect();
     let space = Space::around(axes, all.into_iter(), view);
     let mut panel = space.panel();
-    let names: Vec<&str> = diagram.branches.iter().filter(|own| root(diagram, own).1 == 0).map(|own| own.name.as_str()).collect();
+    let names: Vec<&str> =
+        diagram.branches.iter().filter(|own| root(diagram, own).1 == 0).map(|own| own.name.as_str()).collect();
     for branch in &diagram.branches {
         let (own, depth) = root(diagram, branch);
         let colour = nth(names.iter().position(|name| *name == own.name).unwrap_or(0));

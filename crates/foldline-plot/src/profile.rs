@@ -62,7 +62,9 @@ pub fn crossings(model: &Model, point: &Point, channel: usize, level: f64) -> Op
 /// The cycle of a point, if its profile was stored.
 pub fn cycle_of(point: &Point) -> Option<&Cycle> {
     match &point.solution {
-        Solution::Cycle(cycle) if point.solution.is_stored() && cycle.intervals() > 0 && cycle.degree > 0 => Some(cycle),
+        Solution::Cycle(cycle) if point.solution.is_stored() && cycle.intervals() > 0 && cycle.degree > 0 => {
+            Some(cycle)
+        }
         _ => None,
     }
 }

@@ -32,7 +32,8 @@ pub fn branch_layers(diagram: &Diagram, model: &Model, x: Quantity, channel: usi
     for branch in diagram.branches.iter().filter(|branch| branch.held.is_none()) {
         let (own, depth) = root(diagram, branch);
         let colour = nth(roots.iter().position(|name| *name == own.name).unwrap_or(0));
-        let named = |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.faint(0.65).named(LIGHTER) };
+        let named =
+            |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.faint(0.65).named(LIGHTER) };
         let values = |point: &Point| match plane {
             Plane::Stroboscopic => stroboscopic(model, point),
             Plane::Level(of, level) => crossings(model, point, of, level),
@@ -64,8 +65,7 @@ fn lines(
 ) -> Vec<Layer> {
     let periods = branch.points.iter().map(|point| point.solution.forcing_periods()).max().unwrap_or(1).max(1);
     let of = |number: usize| {
-        let stretches =
-            line_of(branch, |point| Some([drawn(x, point)?, *values(point)?.get(channel)?.get(number)?]));
+        let stretches = line_of(branch, |point| Some([drawn(x, point)?, *values(point)?.get(channel)?.get(number)?]));
         let shape = Shape::Curve { stretches, rounded: true, stability: true };
         Layer { shape, ..Layer::curve(&[], colour) }.wide(1.6)
     };

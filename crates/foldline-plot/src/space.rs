@@ -101,7 +101,11 @@ impl Space {
 
     /// Distance of values from the eye, for drawing what is far first: larger is nearer.
     pub fn depth(&self, place: [f64; 3]) -> f64 {
-        (0..3).map(|k| self.towards[k] * self.half[k] * (2.0 * self.scales[k].share(self.scales[k].units(place[k])) - 1.0)).sum()
+        (0..3)
+            .map(|k| {
+                self.towards[k] * self.half[k] * (2.0 * self.scales[k].share(self.scales[k].units(place[k])) - 1.0)
+            })
+            .sum()
     }
 
     /// The panel with the box and its ticks, to which layers are added.

@@ -103,7 +103,7 @@ pub fn panels(diagram: &Diagram, model: &Model, x: Quantity, log: bool) -> ([Pan
             against.layers.push(named(Layer::curve(&by, colour).wide(1.4)));
             let finite = || in_plane.iter().filter(|at| at[0].is_finite());
             starts.extend(finite().next().copied());
-            ends.extend(finite().last().copied());
+            ends.extend(finite().next_back().copied());
         }
         plane.layers.push(Layer::scatter(starts, Marker::Circle, colour).wide(2.6).hollow().named("first point"));
         plane.layers.push(Layer::scatter(ends, Marker::Circle, colour).wide(2.6).named("last point"));

@@ -60,8 +60,10 @@ pub fn panel(mut spectra: Vec<Spectrum>, x: Axis, frequency: Axis, highest: f64,
     let shown: Vec<usize> = (0..columns).map(nearest).collect();
     let mut layers = Vec::new();
     for (k, colour) in CLASSES.into_iter().enumerate().rev() {
-        let filled: Vec<bool> =
-            (0..ROWS).flat_map(|row| shown.iter().map(move |own| (row, *own))).map(|(row, own)| class(levels[own][row]) == k).collect();
+        let filled: Vec<bool> = (0..ROWS)
+            .flat_map(|row| shown.iter().map(move |own| (row, *own)))
+            .map(|(row, own)| class(levels[own][row]) == k)
+            .collect();
         let (from, to) = (k as f64 * width - RANGE, (k + 1) as f64 * width - RANGE);
         let name = if k == 0 { format!("below {to:.0} dB") } else { format!("{from:.0} to {to:.0} dB") };
         layers.push(Layer::cells([[low, high], [0.0, highest]], columns, filled, colour).named(name.replace('-', "−")));

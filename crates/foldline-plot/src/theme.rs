@@ -79,15 +79,8 @@ pub fn themed(svg: String, theme: Theme) -> String {
 }
 
 /// Marks along curves, for all but the first colour.
-const BEADS: [Marker; 7] = [
-    Marker::Circle,
-    Marker::Square,
-    Marker::Triangle,
-    Marker::Cross,
-    Marker::Diamond,
-    Marker::Nabla,
-    Marker::Plus,
-];
+const BEADS: [Marker; 7] =
+    [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Cross, Marker::Diamond, Marker::Nabla, Marker::Plus];
 
 /// Draws curves, marks and texts of a figure black. Curves of different colours get different small marks along them.
 /// Cells and shaded intervals stay as they are.

@@ -36,8 +36,12 @@ pub fn panel(
     count: usize,
     view: View,
 ) -> Option<Panel> {
-    let with: Vec<(&Point, f64)> =
-        branch.points.iter().filter(|point| cycle_of(point).is_some()).filter_map(|p| Some((p, drawn(x, p)?))).collect();
+    let with: Vec<(&Point, f64)> = branch
+        .points
+        .iter()
+        .filter(|point| cycle_of(point).is_some())
+        .filter_map(|p| Some((p, drawn(x, p)?)))
+        .collect();
     if with.len() < 2 {
         return None;
     }
@@ -63,14 +67,18 @@ pub fn panel(
         Waterfall::Harmonics => [
             Axis::new("harmonic of 1/T").from(0.5, HARMONICS as f64 + 0.5),
             parameter,
-            Axis::new(format!("amplitude of {}", channel_label(model, channel))).from(SMALLEST * largest, 1.5 * largest).log(),
+            Axis::new(format!("amplitude of {}", channel_label(model, channel)))
+                .from(SMALLEST * largest, 1.5 * largest)
+                .log(),
         ],
     };
     let all: Vec<[f64; 3]> = curves.iter().flat_map(|(_, line, _)| line.iter().copied()).collect();
     let space = Space::around(axes, all.into_iter(), view);
     let mut panel = space.panel();
     // What is far is drawn first.
-    curves.sort_by(|a, b| space.depth([a.1[0][0], a.0, space.floor()]).total_cmp(&space.depth([b.1[0][0], b.0, space.floor()])));
+    curves.sort_by(|a, b| {
+        space.depth([a.1[0][0], a.0, space.floor()]).total_cmp(&space.depth([b.1[0][0], b.0, space.floor()]))
+    });
     for (at, line, stable) in curves {
         match what {
             Waterfall::Profiles => {

@@ -197,7 +197,7 @@ export class Desk {
       const rows = checks.filter((own) => own.found !== 0 || own.stated !== null);
       const said = removed > 0 ? "its profile was not kept (store in the study)"
         : checks.length === 0 ? `nothing could be compared: ${undecided[0] ?? "the method does not apply here"}`
-        : wrong > 0 ? `${wrong} of ${checks.length} differences are larger than the stated errors` : `all ${checks.length} differences are within the stated errors`;
+        : wrong > 0 ? `${wrong} of ${checks.length} differences are larger than the stated errors` : checks.length === 1 ? "the difference is within the stated error" : `all ${checks.length} differences are within the stated errors`;
       const text = `${name}, position ${place.position}: ${said}.`;
       this.verified = { text, rows, undecided: checks.length > 0 ? undecided : [] };
       this.heard.open("verified");

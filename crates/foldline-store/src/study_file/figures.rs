@@ -12,9 +12,8 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 const KEYS: [&str; 7] = ["name", "description", "title", "columns", "size", "theme", "panel"];
-const PANEL_KEYS: [&str; 14] = [
-    "label", "title", "show", "x", "y", "z", "branch", "window", "log", "strobe", "section", "count", "span", "view",
-];
+const PANEL_KEYS: [&str; 14] =
+    ["label", "title", "show", "x", "y", "z", "branch", "window", "log", "strobe", "section", "count", "span", "view"];
 /// Names of the themes.
 pub const THEMES: [&str; 3] = ["light", "dark", "print"];
 /// Smallest and largest width and height of a figure.
@@ -193,7 +192,11 @@ fn section(walk: &mut Walk, value: &Value, model: &Model) -> Option<(String, f64
 fn window(walk: &mut Walk, value: &Value) -> Option<[f64; 4]> {
     let found = numbers::<4>(walk, value, "`window`", "[0, 1, -2, 2]")?;
     if found[0] >= found[1] || found[2] >= found[3] {
-        walk.report(value.span(), "a range of `window` is empty or reversed", "write [x0, x1, y0, y1] with x0 < x1 and y0 < y1");
+        walk.report(
+            value.span(),
+            "a range of `window` is empty or reversed",
+            "write [x0, x1, y0, y1] with x0 < x1 and y0 < y1",
+        );
         return None;
     }
     Some(found)
@@ -202,7 +205,11 @@ fn window(walk: &mut Walk, value: &Value) -> Option<[f64; 4]> {
 fn numbers<const N: usize>(walk: &mut Walk, value: &Value, what: &str, example: &str) -> Option<[f64; N]> {
     let list = value.get_ref().as_array().map(|list| list.iter().collect::<Vec<_>>()).unwrap_or_default();
     if list.len() != N {
-        walk.report(value.span(), format!("{what} is not a list of {N} numbers"), format!("write, for example, {example}"));
+        walk.report(
+            value.span(),
+            format!("{what} is not a list of {N} numbers"),
+            format!("write, for example, {example}"),
+        );
         return None;
     }
     let found: Vec<f64> = list.into_iter().filter_map(|one| walk.number(one, &format!("an entry of {what}"))).collect();

@@ -260,7 +260,7 @@ test("a point is verified by an independent method", limit, async (t) => {
   await page.waitForFunction(() => document.getElementById("actions").hidden === false);
   await page.click('#actions button:text-is("Verify")');
   await page.locator("#log-text table").waitFor();
-  await page.waitForFunction(() => document.querySelector("#log-text p")?.textContent.includes("within the stated errors"));
+  await page.waitForFunction(() => document.querySelector("#log-text p")?.textContent.includes("within the stated error"));
   assert.ok((await page.locator("#log-text tbody tr").count()) > 0);
   assert.deepEqual(errors, []);
 });
