@@ -20,16 +20,16 @@ export function savePdf(run, diagram) {
   download(`${fileName(run, diagram)}.pdf`, diagram.chart.pdf(), "application/pdf");
 }
 
-/** Place in the page that the server sends at which the view is inserted. */
-const DATA = '<script type="application/json" id="data-run">';
+/** Beginning of an element with data. This script is part of a page, so the name of the element may not follow a bracket. */
+const TAG = "script";
+const data = (id) => `<${TAG} type="application/json" id="data-${id}">`;
 
 /** Saves the whole page with its data, so that it opens without a server; it shows the view of now. */
 export async function savePage(run) {
   const page = await run.source.page();
-  // The end of an element may not stand in a script that is part of a page.
-  const view = `<script type="application/json" id="data-view">${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}<\/script>\n`;
+  const view = `${data("view")}${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}</${TAG}>\n`;
   const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
-  download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(DATA, () => view + DATA), "text/html");
+  download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(data("run"), (found) => view + found), "text/html");
 }
 
 export async function savePng(run, diagram) {

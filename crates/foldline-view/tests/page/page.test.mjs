@@ -258,6 +258,8 @@ test("a point is verified by an independent method", limit, async (t) => {
   const at = await pointAt(page, "fold", row.Omega);
   await page.mouse.click(at[0], at[1]);
   await page.waitForFunction(() => document.getElementById("actions").hidden === false);
+  // The study of a run that is opened by its folder can be extended too.
+  await page.locator('#actions button:text-is("Continue")').waitFor();
   await page.click('#actions button:text-is("Verify")');
   await page.locator("#log-text table").waitFor();
   await page.waitForFunction(() => document.querySelector("#log-text p")?.textContent.includes("within the stated error"));
