@@ -10,6 +10,7 @@ mod exact;
 mod explore;
 mod export;
 mod failure;
+mod figures;
 mod import_auto;
 mod new;
 mod plot;

@@ -99,6 +99,7 @@ fn drafted(
         store: Store::All,
         spreads: Vec::new(),
         uncertainty: false,
+        figures: Vec::new(),
     };
     let watch = Watch::draft(folder, draft);
     let files = Files { study, model: model_file, folder: folder.to_path_buf() };

@@ -43,6 +43,7 @@ mod other_fields;
 mod pages;
 mod parameter_maps;
 mod permuted;
+mod pictures;
 mod pulses;
 mod quasi_periodic;
 mod responses;

@@ -121,7 +121,7 @@ pub fn root_count(diagram: &Diagram) -> usize {
 const MARK: f64 = 2.6;
 
 /// Legend entry of branches that start at a special point of another branch.
-const LIGHTER: &str = "branching off";
+pub(crate) const LIGHTER: &str = "branching off";
 
 /// Maximum number of branches in the legend.
 const MOST: usize = 14;

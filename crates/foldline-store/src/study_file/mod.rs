@@ -2,7 +2,7 @@
 //!
 //! **Idea.** A study specifies in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`),
 //! branches (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`), whole diagrams
-//! (`[[explore]]`), simulations (`[[survey]]`, `[[sweep]]`) and maps over parameters (`[[map]]`). The whole text is read before it is rejected, so that
+//! (`[[explore]]`), simulations (`[[survey]]`, `[[sweep]]`), maps over parameters (`[[map]]`) and pictures (`[[figure]]`). The whole text is read before it is rejected, so that
 //! all mistakes are reported at once, each with position, cause and cure. The format is described in
 //! docs/book/study-files.md.
 
@@ -11,6 +11,7 @@ mod branches;
 mod curves;
 mod designs;
 mod explorations;
+mod figures;
 mod grown;
 mod holds;
 mod homotopies;
@@ -23,6 +24,7 @@ mod seeds;
 mod sharpened;
 
 pub use append::{Action, Appended, Place, Refusal, append};
+pub use figures::{FigurePlan, PanelPlan, Show, THEMES};
 pub use grown::{Added, added};
 pub use sharpened::Unsharpened;
 
@@ -64,6 +66,8 @@ pub struct Study {
     pub spreads: Vec<(usize, Spread)>,
     /// True if plots show the uncertainty of special points.
     pub uncertainty: bool,
+    /// Figures of the run.
+    pub figures: Vec<FigurePlan>,
 }
 
 /// Points of cycles whose profiles stay in the run file when the run is complete. Special points and the ends of
@@ -79,7 +83,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 22] = [
+const ROOT_KEYS: [&str; 23] = [
     "model",
     "title",
     "description",
@@ -102,6 +106,7 @@ const ROOT_KEYS: [&str; 22] = [
     "sweep",
     "design",
     "map",
+    "figure",
 ];
 
 /// Reads a study file and the model that it names. On failure, returns every mistake found.
@@ -274,6 +279,7 @@ fn parse(
     let designs = designs::read(&mut walk, &root, &ground, &explorations, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(designs.iter().map(|own| own.name.as_str())).collect();
     let maps = maps::read(&mut walk, &root, &ground, &explorations, &defaults, &taken);
+    let figures = figures::read(&mut walk, &root, &model);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
         check_totals(&mut walk, &root, &model);
     }
@@ -313,6 +319,7 @@ fn parse(
         store,
         spreads,
         uncertainty,
+        figures,
     })
 }
 
