@@ -11,7 +11,7 @@ fn files_that_are_not_utf_8_text_are_named_for_what_they_are() {
     says(&desk.refused(&["check", "wide.toml"]), &["wide.toml", "UTF-16", "save the file as UTF-8 text"]);
     let latin1 = [&text.as_bytes()[..], b"# Schwingf\xe4hig\n"].concat();
     std::fs::write(desk.path("latin.toml"), latin1).unwrap();
-    let place = format!("latin.toml:{}:12", text.lines().count() + 1);
+    let place = format!("latin.toml:{}:11", text.lines().count() + 1);
     says(&desk.refused(&["check", "latin.toml"]), &[&place, "not UTF-8 text", "save the file as UTF-8 text"]);
     // A byte order mark and line ends of Windows are no mistakes.
     desk.write("pendulum.toml", &format!("\u{feff}{}", text.replace('\n', "\r\n")));

@@ -100,7 +100,7 @@ pub(crate) fn beside(path: &Path) -> String {
     similar().unwrap_or_default()
 }
 
-/// What to give instead of a folder.
+/// Hint for a folder given in place of a file.
 fn inside(folder: &Path) -> String {
     match &texts(folder)[..] {
         [] => "give a file; `foldline new oscillator` writes a model and a study".to_string(),
