@@ -337,13 +337,13 @@ pub struct Simulate {
     #[arg(long = "start", value_name = "NAME=VALUE,...", allow_hyphen_values = true)]
     pub start: Vec<String>,
     /// Length of the trajectory, in the time unit of the model or with a unit such as "20 ms"
-    #[arg(long, value_name = "TIME", conflicts_with = "periods")]
+    #[arg(long, value_name = "TIME", conflicts_with = "periods", allow_negative_numbers = true)]
     pub time: Option<String>,
     /// Length in forcing periods [default for a forced model: 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub periods: Option<u32>,
     /// Time between rows; `period` gives one row per forcing period [default: 200 rows]
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
     pub every: Option<String>,
     /// States and outputs to show [default: all of them; in a picture, the states]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -645,7 +645,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     pub format: ExportFormat,
     /// Folder for the tables, or NetCDF or HTML file [default: DIR/csv, DIR/parquet, DIR/run.nc, DIR/run.html]
-    #[arg(long, value_name = "PATH")]
+    #[arg(short, long, alias = "output", value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Only this branch, or the legs of this homotopy; can be repeated [default: everything]
     #[arg(long, value_name = "NAME")]

@@ -206,11 +206,11 @@ fn a_pitchfork_without_a_cubic_term_has_one_point_on_its_side_branch() {
 /// doubling at x = -0.0003; the same flow has them with a Hopf point in between.
 #[test]
 fn two_folds_with_another_point_between_them_are_found_on_one_step() {
-    let map = "[map]\nx = { equation = \"x + 0.2*(a + 0.003*x - x^3) + 0.1*y^2\", range = [-2, 2] }\n\
-               y = { equation = \"-(1 + 0.3*(x + 0.0003))*y\", range = [-1, 1] }\n";
+    let map = "[states]\nx = { range = [-2, 2] }\ny = { range = [-2, 2] }\n[map]\n\
+               x = \"x + 0.2*(a + 0.003*x - x^3) + 0.1*y^2\"\ny = \"-(1 + 0.3*(x + 0.0003))*y\"\n";
     let flow = "[states]\nx = { equation = \"a + 0.003*x - x^3\", range = [-2, 2] }\n\
-                y = { equation = \"0.3*(x + 0.0003)*y - z - y^3\", range = [-1, 1] }\n\
-                z = { equation = \"0.3*(x + 0.0003)*z + y - z^3\", range = [-1, 1] }\n";
+                y = { equation = \"0.3*(x + 0.0003)*y - z\", range = [-1, 1] }\n\
+                z = { equation = \"0.3*(x + 0.0003)*z + y\", range = [-1, 1] }\n";
     for (states, start, between) in
         [(map, "{ x = 1, y = 0 }", "period-doubling"), (flow, "{ x = 1, y = 0, z = 0 }", "hopf")]
     {

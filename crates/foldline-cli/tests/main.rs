@@ -37,6 +37,7 @@ mod maps;
 mod marks;
 mod mistakes;
 mod neutral;
+mod newcomers;
 mod normal_forms;
 mod null_spaces;
 mod other_fields;

@@ -33,7 +33,8 @@ use crate::finite::{check_explorations, check_seeds};
 use crate::model_file::items::spread;
 use crate::model_file::{parse_model, parse_model_of_run, read_model};
 use crate::nearest::suggest;
-use crate::toml_walk::{Value, Walk, read_text, unreadable};
+use crate::text_file::{beside, read_text, unreadable};
+use crate::toml_walk::{Value, Walk};
 use foldline::attractors::Limits;
 use foldline::contract::VectorField;
 use foldline::explore::Plan;
@@ -127,7 +128,7 @@ pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Ve
             walk.report(
                 value.span(),
                 format!("the model file {} cannot be read: {error}", model_path.display()),
-                "give the path of a model file, relative to the folder of the study",
+                format!("give the path of a model file, relative to the folder of the study{}", beside(&model_path)),
             );
             return None;
         }
@@ -548,7 +549,11 @@ fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &m
 
 fn unknown_parameter(walk: &mut Walk, span: std::ops::Range<usize>, name: &str, model: &Model) {
     let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
-    walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known));
+    let hint = match model.state_index(name) {
+        Some(_) => format!("`{name}` is a state; the parameters are: {}", known.join(", ")),
+        None => suggest(name, &known),
+    };
+    walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), hint);
 }
 
 /// Reads the name of an item, which is required and must be unique.
