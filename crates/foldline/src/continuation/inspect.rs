@@ -722,8 +722,8 @@ impl Follow<'_> {
     pub(super) fn is_undecided(&mut self, station: &Station) -> bool {
         /// Distance from the border, relative to the largest eigenvalue or multiplier.
         const ROUNDING: f64 = 1e-13;
-        /// The same, beyond which no displacement matters: an equilibrium is displaced by at most the square root of the
-        /// accuracy of a number where the matrix can still be solved with.
+        /// Distance from 0 of an eigenvalue, relative to the largest, beyond which no displacement matters: an equilibrium is
+        /// displaced by at most the square root of the accuracy of a number where its matrix can still be solved with.
         const NEAR: f64 = 1e-7;
         let spectrum = station.point.free_spectrum();
         let sizes = spectrum.iter().map(|z| z.norm());

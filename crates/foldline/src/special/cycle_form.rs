@@ -76,7 +76,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
     shaken_value(kind, setting, at, 0.0)
 }
 
-/// The same, with a relative error of this size, without structure, in the critical eigenfunction.
+/// Computes the coefficient with a relative error of size `shaken`, without structure, in the critical eigenfunction.
 fn shaken_value(kind: Kind, setting: Setting, at: &Point, shaken: f64) -> Option<Value> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
