@@ -9,7 +9,7 @@ fn files_that_are_not_utf_8_text_are_named_for_what_they_are() {
     let utf16: Vec<u8> = format!("\u{feff}{text}").encode_utf16().flat_map(u16::to_le_bytes).collect();
     std::fs::write(desk.path("wide.toml"), utf16).unwrap();
     says(&desk.refused(&["check", "wide.toml"]), &["wide.toml", "UTF-16", "save the file as UTF-8 text"]);
-    let latin1 = [&text.as_bytes()[..], b"# Schwingf\xe4hig\n"].concat();
+    let latin1 = [text.as_bytes(), b"# Schwingf\xe4hig\n"].concat();
     std::fs::write(desk.path("latin.toml"), latin1).unwrap();
     let place = format!("latin.toml:{}:11", text.lines().count() + 1);
     says(&desk.refused(&["check", "latin.toml"]), &[&place, "not UTF-8 text", "save the file as UTF-8 text"]);
