@@ -291,12 +291,7 @@ impl Follow<'_> {
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
             && work(cost.factorisations, &left.mesh) < ALLOWANCE
-            && (jumps.len() > 1
-                || !explained
-                || misplaced
-                || misfit.is_some()
-                || cut_there.is_some()
-                || suspicious)
+            && (jumps.len() > 1 || !explained || misplaced || misfit.is_some() || cut_there.is_some() || suspicious)
             && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {
             let cut = match &located[..] {
