@@ -314,7 +314,8 @@ impl Follow<'_> {
     ) -> Step {
         let equilibria = left.point.solution.period().is_none();
         let counts = self.settings.stability && equilibria && tried.end.is_none();
-        if !counts || !self.is_undecided(&tried.right) {
+        // Along a family of equilibria rounding decides everywhere.
+        if !counts || !self.is_undecided(&tried.right) || self.is_undecided(left) {
             return tried;
         }
         for longer in [2.0, 4.0, 8.0, 16.0] {

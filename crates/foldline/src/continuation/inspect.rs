@@ -637,9 +637,9 @@ impl Follow<'_> {
     }
 
     /// Distance at which some monitor has a different sign than at the left end, if one is found; unless `all`, only of
-    /// monitors with the same sign at both ends. `first` is true if nothing is known of the preceding step: equilibria, which are cheap, are then sampled more densely towards both
-    /// ends. For cycles the midpoint shows the rates of change of the monitors, which suffices if none may have touched
-    /// zero.
+    /// monitors with the same sign at both ends. `first` is true if nothing is known of the preceding step: equilibria,
+    /// which are cheap, are then sampled more densely towards both ends. For cycles the midpoint shows the rates of change
+    /// of the monitors, which suffices if none may have touched zero.
     fn seen_between(
         &mut self,
         stretch: &Stretch,
