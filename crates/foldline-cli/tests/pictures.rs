@@ -267,3 +267,22 @@ fn mistakes_in_figures_have_line_column_and_cure() {
     }
     assert_eq!(lines.len(), expected.len(), "{lines:?}");
 }
+
+/// x = 0 of x' = a x - x⁵ has a pitchfork at a = 0 without a cubic term.
+#[test]
+fn special_points_whose_coefficients_vanish_are_drawn() {
+    let model = "[parameters]\na = -0.5\n[states]\nx = { equation = \"a*x - x^5\", range = [-2, 2] }\n";
+    let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = { x = 0 }\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"a\"\nrange = [-0.5, 1]\n";
+    let own = parse_study(study, "study.toml", model, "m.toml").expect("the study is right");
+    let system = System::of_plan(&own.model, &own.plan);
+    let diagram = explore::run(&system, &own.plan, 1, Diagram::default(), &Unobserved);
+    let layers = foldline_plot::branches::special_layers(
+        &diagram.branches[0],
+        foldline_plot::Quantity::Parameter(0),
+        foldline_plot::quantity::default_y(&own.model),
+        "#000000",
+    );
+    let names: Vec<_> = layers.iter().filter_map(|layer| layer.name.as_deref()).collect();
+    assert_eq!(names, ["branch point, degenerate"]);
+}
