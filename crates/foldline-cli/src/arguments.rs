@@ -66,7 +66,7 @@ pub enum Command {
     /// Show a run in the browser, also while it is computed
     View(View),
     /// Draw the bifurcation diagram of a run
-    Plot(Plot),
+    Plot(Box<Plot>),
     /// Export a run as CSV, Parquet or NetCDF, or as a page for a browser
     Export(Export),
     /// List the solutions in AUTO-07p files, or write a study that starts from them
@@ -337,13 +337,13 @@ pub struct Simulate {
     #[arg(long = "start", value_name = "NAME=VALUE,...", allow_hyphen_values = true)]
     pub start: Vec<String>,
     /// Length of the trajectory, in the time unit of the model or with a unit such as "20 ms"
-    #[arg(long, value_name = "TIME", conflicts_with = "periods")]
+    #[arg(long, value_name = "TIME", conflicts_with = "periods", allow_negative_numbers = true)]
     pub time: Option<String>,
     /// Length in forcing periods [default for a forced model: 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub periods: Option<u32>,
     /// Time between rows; `period` gives one row per forcing period [default: 200 rows]
-    #[arg(long, value_name = "TIME")]
+    #[arg(long, value_name = "TIME", allow_negative_numbers = true)]
     pub every: Option<String>,
     /// States and outputs to show [default: all of them; in a picture, the states]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
@@ -584,12 +584,49 @@ pub struct Plot {
     /// With --susceptibility: ν, an expression of parameters in radians per unit of time
     #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true, requires = "susceptibility")]
     pub frequency: Option<String>,
+    /// Content of the picture
+    #[arg(long, value_name = "WHAT", value_parser = ["branches", "multipliers", "orbits", "waterfall", "harmonics", "spectrogram"], conflicts_with_all = ["map", "curves", "uncertainty", "tornado", "susceptibility"])]
+    pub show: Option<String>,
+    /// Third axis: draw the branches in three dimensions
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["map", "show", "uncertainty", "tornado", "susceptibility"])]
+    pub z: Option<String>,
+    /// With three axes: direction of the view in degrees, its angle about the vertical axis and its height [default: -60,25]
+    #[arg(long, value_name = "AZIMUTH,ELEVATION", allow_hyphen_values = true)]
+    pub view: Option<String>,
+    /// Draw the state on the vertical axis at the start of this number of forcing periods: of the motions of surveys and sweeps,
+    /// which are integrated again from their last states, and of the cycles on branches
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u64).range(1..=100_000), conflicts_with_all = ["map", "show", "z", "curves", "uncertainty", "tornado", "susceptibility"])]
+    pub strobe: Option<u64>,
+    /// Draw it where this state or output passes a level upwards instead (Poincaré section)
+    #[arg(long, value_name = "NAME=LEVEL", allow_hyphen_values = true, conflicts_with_all = ["map", "show", "z", "curves", "uncertainty", "tornado", "susceptibility"])]
+    pub section: Option<String>,
+    /// Number of orbits (at most 24) or of profiles in a waterfall [default: 9 or 30]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=400), requires = "show")]
+    pub count: Option<u64>,
     /// Limits of the axes
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
     pub window: Option<String>,
+    /// Show this part in a panel of its own, and its outline in the diagram; can be repeated
+    #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true, conflicts_with_all = ["map", "show", "z", "uncertainty", "tornado", "susceptibility"])]
+    pub zoom: Vec<String>,
+    /// Logarithmic axes
+    #[arg(long, value_name = "AXES", value_parser = ["x", "y", "xy"], conflicts_with_all = ["map", "tornado"])]
+    pub log: Option<String>,
     /// Title of the picture
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
+    /// Width and height, in units of which the text is 13 high [default: 960x600]
+    #[arg(long, value_name = "WIDTHxHEIGHT", conflicts_with_all = ["map", "tornado"])]
+    pub size: Option<String>,
+    /// Colours: on white, on a dark ground, or black with marks that tell curves apart
+    #[arg(long, value_name = "THEME", value_parser = foldline_store::study_file::THEMES, default_value = "light", conflicts_with_all = ["map", "tornado"])]
+    pub theme: String,
+    /// Draw this `[[figure]]` of the study
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "branch", "map", "curves", "window", "title", "log", "size", "show", "z", "strobe", "section", "zoom", "uncertainty", "tornado", "susceptibility"])]
+    pub figure: Option<String>,
+    /// With --figure: study file that describes it [default: the study as it was run]
+    #[arg(long, value_name = "FILE", requires = "figure")]
+    pub study: Option<PathBuf>,
     /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
     /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
@@ -608,7 +645,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     pub format: ExportFormat,
     /// Folder for the tables, or NetCDF or HTML file [default: DIR/csv, DIR/parquet, DIR/run.nc, DIR/run.html]
-    #[arg(long, value_name = "PATH")]
+    #[arg(short, long, alias = "output", value_name = "PATH")]
     pub out: Option<PathBuf>,
     /// Only this branch, or the legs of this homotopy; can be repeated [default: everything]
     #[arg(long, value_name = "NAME")]

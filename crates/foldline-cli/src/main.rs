@@ -10,7 +10,9 @@ mod exact;
 mod explore;
 mod export;
 mod failure;
+mod figures;
 mod import_auto;
+mod misspelt;
 mod new;
 mod plot;
 mod plot_map;
@@ -36,7 +38,11 @@ use std::process::ExitCode;
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
 fn main() -> ExitCode {
-    match answer(Arguments::parse()) {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return misspelt::report(error),
+    };
+    match answer(arguments) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::Short | Outcome::Wrong) => ExitCode::from(3),
         Err(failure) => failure.report(),

@@ -177,9 +177,11 @@ fn create(files: &[(PathBuf, &str)]) -> Result<(), Failure> {
         let refused = |error: std::io::Error| {
             let cure = "choose a writable folder with --out";
             match error.kind() {
-                ErrorKind::PermissionDenied | ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
-                    Failure::typed(format!("cannot write {}: {error}", file.display()), cure)
-                }
+                ErrorKind::PermissionDenied
+                | ErrorKind::NotADirectory
+                | ErrorKind::NotFound
+                | ErrorKind::ReadOnlyFilesystem
+                | ErrorKind::AlreadyExists => Failure::typed(format!("cannot write {}: {error}", file.display()), cure),
                 _ => Failure::Outside(format!("cannot write {}: {error}", file.display())),
             }
         };

@@ -39,6 +39,7 @@ pub fn verbosity() -> Verbosity {
 pub fn report(line: impl std::fmt::Display) -> Result<()> {
     match verbosity() {
         Verbosity::Quiet => Ok(()),
-        Verbosity::Normal | Verbosity::Verbose => writeln!(stderr(), "{line}"),
+        // In one piece, so that lines of two processes, as of `foldline view` and its run, do not mix.
+        Verbosity::Normal | Verbosity::Verbose => stderr().write_all(format!("{line}\n").as_bytes()),
     }
 }

@@ -34,6 +34,13 @@ pub fn show(typed: &Typed) -> Result<Outcome, Failure> {
     }
     // If the file cannot be read, the study reader reports why.
     let text = std::fs::read_to_string(what).unwrap_or_default();
+    if !what.exists() {
+        let message = format!("there is neither a run nor a study or model {}", what.display());
+        return Err(Failure::typed(
+            message,
+            "give the folder of a run, such as runs/study, or a study or model file; without either, examples are shown",
+        ));
+    }
     if !text.is_empty() && !is_study(&text) {
         return model(what, typed);
     }
@@ -99,6 +106,7 @@ fn drafted(
         store: Store::All,
         spreads: Vec::new(),
         uncertainty: false,
+        figures: Vec::new(),
     };
     let watch = Watch::draft(folder, draft);
     let files = Files { study, model: model_file, folder: folder.to_path_buf() };

@@ -175,7 +175,7 @@ fn unsupported_features_are_explained() {
         ("boundary-conditions = []", &["boundary-value problem", "[boundary]"]),
         ("delays = [1]", &["delay differential equations", "DDE-BIFTOOL"]),
         ("torus = 1", &["invariant tori", "switch = { torus = 1 }"]),
-        ("homoclinic = 1", &["connecting orbits", "HomCont"]),
+        ("homoclinic = 1", &["connecting orbits", "saddle-node-homoclinic"]),
         ("noise = 0.1", &["random forcing"]),
         ("ntst = 40", &["meshes cannot be set", "`degree`"]),
         ("ds = 0.01", &["step sizes", "`tolerance`"]),

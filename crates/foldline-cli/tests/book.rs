@@ -48,6 +48,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "maps",
         "maps-in-studies",
         "outputs",
+        "pictures",
         "sensitivities",
         "tori",
         "tutorial-forced-oscillator",

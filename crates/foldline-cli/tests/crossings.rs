@@ -182,3 +182,63 @@ fn a_mesh_that_no_longer_resolves_a_relaxation_oscillation_is_renewed() {
     let folds: Vec<f64> = points(&text, "b/hopf-1", "fold").iter().map(|line| value(line, 2)).collect();
     assert!(code == 0 && folds.len() == 2 && (folds[0] + folds[1] - 1.75).abs() < 1e-5, "{text}");
 }
+
+/// Two Brusselators coupled by diffusion (A = 1, 0.05 and 0.25): the cubic term of their pitchfork at B = 3.3 vanishes, and
+/// along the side branch B - 3.3 grows with the fourth power of the difference between the cells.
+#[test]
+fn a_pitchfork_without_a_cubic_term_has_one_point_on_its_side_branch() {
+    let model = "[parameters]\nB = 3.2\n[states]\n\
+                 x1 = { equation = \"1 - (B + 1)*x1 + x1^2*y1 + 0.05*(x2 - x1)\", range = [0, 3] }\n\
+                 y1 = { equation = \"B*x1 - x1^2*y1 + 0.25*(y2 - y1)\", range = [0, 5] }\n\
+                 x2 = { equation = \"1 - (B + 1)*x2 + x2^2*y2 + 0.05*(x1 - x2)\", range = [0, 3] }\n\
+                 y2 = { equation = \"B*x2 - x2^2*y2 + 0.25*(y1 - y2)\", range = [0, 5] }\n";
+    for tolerance in ["1e-5", "1e-6", "1e-7"] {
+        let study = followed("{ x1 = 1, y1 = 3.2, x2 = 1, y2 = 3.2 }", "B", "[3.1, 3.45]");
+        let (text, code) = run(model, &study, tolerance);
+        assert_eq!(code, 0, "{text}");
+        let side = "b/branch-point-1";
+        assert!(points(&text, side, "fold").is_empty() && points(&text, side, "branch-point").len() <= 1, "{text}");
+        assert_eq!(points(&text, side, "hopf").len(), 2, "{text}");
+    }
+}
+
+/// x ↦ x + (a + 0.003 x - x³)/5, y ↦ -(1 + 0.3 (x + 0.0003)) y has its folds where 3 x² = 0.003, at a = ±2 (0.001)^1.5, and a period
+/// doubling at x = -0.0003; the same flow has them with a Hopf point in between.
+#[test]
+fn two_folds_with_another_point_between_them_are_found_on_one_step() {
+    let map = "[states]\nx = { range = [-2, 2] }\ny = { range = [-2, 2] }\n[map]\n\
+               x = \"x + 0.2*(a + 0.003*x - x^3) + 0.1*y^2\"\ny = \"-(1 + 0.3*(x + 0.0003))*y\"\n";
+    let flow = "[states]\nx = { equation = \"a + 0.003*x - x^3\", range = [-2, 2] }\n\
+                y = { equation = \"0.3*(x + 0.0003)*y - z\", range = [-1, 1] }\n\
+                z = { equation = \"0.3*(x + 0.0003)*z + y\", range = [-1, 1] }\n";
+    for (states, start, between) in
+        [(map, "{ x = 1, y = 0 }", "period-doubling"), (flow, "{ x = 1, y = 0, z = 0 }", "hopf")]
+    {
+        let model = format!("[parameters]\na = 0.997\n{states}");
+        let study = followed(start, "a", "[-1, 1]");
+        let (text, code) = run(&model, &study, "1e-6");
+        assert_eq!(code, 0, "{text}");
+        let mut folds: Vec<f64> = points(&text, "b", "fold").iter().map(|line| value(line, 2)).collect();
+        folds.sort_by(f64::total_cmp);
+        let right = 2.0 * 0.001f64.powf(1.5);
+        assert!(folds.len() == 2 && folds.iter().zip([-right, right]).all(|(a, b)| (a - b).abs() < 1e-9), "{text}");
+        assert_eq!(points(&text, "b", between).len(), 1, "{text}");
+    }
+}
+
+/// The torus points of a circle x² + y² = a whose normal directions u, v obey a linear equation have d = 0 everywhere.
+#[test]
+fn no_chenciner_point_is_read_from_the_rounding_of_a_coefficient_that_vanishes() {
+    let model = "[parameters]\na = 0.25\nb = 0\n[definitions]\nR = \"x^2 + y^2\"\nh = \"0.3*(a - 0.5) + 0.2*b\"\n[states]\n\
+                 x = { equation = \"x*(a - R) - y\", range = [-1.5, 1.5] }\n\
+                 y = { equation = \"y*(a - R) + x\", range = [-1.5, 1.5] }\n\
+                 u = { equation = \"h*u - 0.3*v + 0.1*u*x\", range = [-1, 1] }\n\
+                 v = { equation = \"h*v + 0.3*u + 0.1*v*x\", range = [-1, 1] }\n";
+    let study = "[[seed]]\nname = \"s\"\nstate = { x = 0.5, y = 0, u = 0, v = 0 }\n\
+                 [[branch]]\nname = \"c\"\nfrom = \"s\"\nfree = \"a\"\nrange = [0.1, 2]\n\
+                 [[curve]]\nname = \"C\"\nof = \"c\"\nhold = \"torus\"\nfree = \"b\"\nrange = [-1, 1]\n";
+    for tolerance in ["1e-5", "1e-6", "1e-7", "1e-8"] {
+        let (text, _) = run(model, study, tolerance);
+        assert!(text.contains("\nC ") && points(&text, "C", "chenciner").is_empty(), "{text}");
+    }
+}

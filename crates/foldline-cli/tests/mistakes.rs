@@ -36,33 +36,34 @@ free = "mu"
 range = [-1, 2]
 "#;
 
-struct Desk {
+/// Folder with a model and a study.
+pub struct Desk {
     folder: tempfile::TempDir,
 }
 
 impl Desk {
     /// Returns a folder with a correct model and study.
-    fn new() -> Desk {
+    pub fn new() -> Desk {
         let desk = Desk { folder: tempfile::tempdir().unwrap() };
         desk.write("pendulum.toml", MODEL);
         desk.write("study.toml", STUDY);
         desk
     }
 
-    fn path(&self, name: &str) -> PathBuf {
+    pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    fn write(&self, name: &str, text: &str) {
+    pub fn write(&self, name: &str, text: &str) {
         std::fs::write(self.path(name), text).unwrap();
     }
 
-    fn foldline(&self, arguments: &[&str]) -> Output {
+    pub fn foldline(&self, arguments: &[&str]) -> Output {
         Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(self.folder.path()).output().unwrap()
     }
 
     /// Returns the message of a command that must fail with exit code 2.
-    fn refused(&self, arguments: &[&str]) -> String {
+    pub fn refused(&self, arguments: &[&str]) -> String {
         let output = self.foldline(arguments);
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
@@ -71,12 +72,12 @@ impl Desk {
     }
 
     /// Returns the message for the study with one piece of it replaced.
-    fn study(&self, piece: &str, by: &str) -> String {
+    pub fn study(&self, piece: &str, by: &str) -> String {
         self.refuse_changed("study.toml", STUDY, piece, by)
     }
 
     /// Returns the message for the model with one piece of it replaced.
-    fn model(&self, piece: &str, by: &str) -> String {
+    pub fn model(&self, piece: &str, by: &str) -> String {
         self.refuse_changed("pendulum.toml", MODEL, piece, by)
     }
 
@@ -98,7 +99,7 @@ fn first_line(message: &str) -> &str {
 
 /// Asserts that a message contains all of the given pieces.
 #[track_caller]
-fn says(message: &str, pieces: &[&str]) {
+pub fn says(message: &str, pieces: &[&str]) {
     for piece in pieces {
         assert!(message.contains(piece), "\"{piece}\" is missing in:\n{message}");
     }

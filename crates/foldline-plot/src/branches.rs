@@ -5,6 +5,7 @@ use crate::figure::{Layer, Marker, Shape};
 use crate::palette::{BLACK, nth};
 use foldline::diagram::{Branch, Diagram, Kind, Origin};
 use foldline::special::quantity::Quantity;
+use std::cmp::Reverse;
 
 /// Layers of a branch in one colour, the curve first: solid where stable, dashed where unstable, with its special
 /// points hollow and named by their kind.
@@ -27,8 +28,11 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
     let of = |kind: Kind, own: Option<&str>| -> Vec<[f64; 2]> {
         all.iter().filter(|(k, known, _)| *k == kind && *known == own).map(|(.., place)| *place).collect()
     };
-    let kinds =
-        Kind::ALL.into_iter().flat_map(|kind| [None, Some("supercritical"), Some("subcritical")].map(|c| (kind, c)));
+    let mut cases: Vec<Option<&str>> = all.iter().map(|(_, known, _)| *known).collect();
+    // Supercritical before subcritical, as in the tables.
+    cases.sort_by_key(|case| (case.is_some(), Reverse(*case)));
+    cases.dedup();
+    let kinds = Kind::ALL.into_iter().flat_map(|kind| cases.iter().map(move |case| (kind, *case)));
     kinds
         .map(|(kind, known)| (kind, known, of(kind, known)))
         .filter(|(.., places)| !places.is_empty())
@@ -121,7 +125,7 @@ pub fn root_count(diagram: &Diagram) -> usize {
 const MARK: f64 = 2.6;
 
 /// Legend entry of branches that start at a special point of another branch.
-const LIGHTER: &str = "branching off";
+pub(crate) const LIGHTER: &str = "branching off";
 
 /// Maximum number of branches in the legend.
 const MOST: usize = 14;

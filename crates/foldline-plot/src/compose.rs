@@ -100,7 +100,9 @@ fn provisional(frame: &Frame, panel: &Panel) -> Frame {
 }
 
 fn draw(out: &mut String, panel: &Panel, frame: &Frame) {
-    frame.grid(out);
+    if !panel.bare {
+        frame.grid(out);
+    }
     let mut painter = Painter::new(frame);
     for zoom in &panel.zooms {
         painter.zoom(zoom);

@@ -63,17 +63,26 @@ fn each_iterate(branch: &Branch, y: Quantity) -> impl Iterator<Item = Quantity> 
 }
 
 fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
-    let mut vertices: Vec<Option<Vertex>> = Vec::new();
+    line_of(branch, |point| place(point, x, y))
+}
+
+/// Vertices of a branch, points and special points in order, at the places that `place` gives to them; interrupted where
+/// it gives none, each with the stability of the segment that leads to it.
+pub fn line_of<const N: usize>(
+    branch: &Branch,
+    place: impl Fn(&Point) -> Option<[f64; N]>,
+) -> Vec<Vec<([f64; N], bool)>> {
+    let mut vertices: Vec<Option<([f64; N], bool)>> = Vec::new();
     // Stability of the segment that leads to the next vertex.
     let mut stable = true;
     let mut specials = branch.special.iter().peekable();
     for point in &branch.points {
         // In a branch without special points, a segment with an unstable end is drawn unstable.
         let silent = branch.special.is_empty() && point.unstable > 0;
-        vertices.push(place(point, x, y).map(|at| (at, stable && !silent)));
+        vertices.push(place(point).map(|at| (at, stable && !silent)));
         stable = point.unstable == 0;
         while let Some(special) = specials.next_if(|s| s.point.position <= point.position) {
-            let at = place(&special.point, x, y);
+            let at = place(&special.point);
             vertices.push(at.map(|at| (at, special.unstable_before == 0)));
             stable = special.unstable_after == 0;
             if has_corner(special) {
@@ -84,11 +93,11 @@ fn one_line(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     }
     let closed = branch.ends.iter().flatten().any(|end| *end == Ending::Closed);
     if let (true, Some(first)) = (closed, branch.points.first()) {
-        let home = place(first, x, y).filter(|home| !is_another_copy(&vertices, *home));
+        let home = place(first).filter(|home| !is_another_copy(&vertices, *home));
         vertices.push(home.map(|at| (at, stable)));
     }
     let parts = vertices.split(Option::is_none);
-    parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<Vertex>| !s.is_empty()).collect()
+    parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<_>| !s.is_empty()).collect()
 }
 
 /// True if the branch has a corner at a special point: its direction jumps there.
@@ -99,11 +108,11 @@ fn has_corner(special: &SpecialPoint) -> bool {
 
 /// True if a branch that closes around a circle returns to a copy of its start, a full turn away: the segment that
 /// closes it would be much longer than any other. (The start lies within one step of the last point.)
-fn is_another_copy(vertices: &[Option<Vertex>], home: [f64; 2]) -> bool {
+fn is_another_copy<const N: usize>(vertices: &[Option<([f64; N], bool)>], home: [f64; N]) -> bool {
     const FAR: f64 = 4.0;
-    let known: Vec<[f64; 2]> = vertices.iter().flatten().map(|(at, _)| *at).collect();
+    let known: Vec<[f64; N]> = vertices.iter().flatten().map(|(at, _)| *at).collect();
     let longest = |axis: usize| known.windows(2).fold(0.0, |m: f64, w| m.max((w[1][axis] - w[0][axis]).abs()));
-    known.last().is_some_and(|last| (0..2).any(|axis| (last[axis] - home[axis]).abs() > FAR * longest(axis)))
+    known.last().is_some_and(|last| (0..N).any(|axis| (last[axis] - home[axis]).abs() > FAR * longest(axis)))
 }
 
 /// For each segment, the vertices to insert so that the polyline becomes a smooth curve through all given vertices:
@@ -164,6 +173,14 @@ pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, Option<&'s
         branch.special.iter().filter_map(move |s| Some((s.kind, s.criticality(), place(&s.point, x, y)?)))
     };
     each_iterate(branch, y).flat_map(of).collect()
+}
+
+/// Special points with their kind, criticality where known, and the place that `place` gives to them.
+pub fn marks_of<const N: usize>(
+    branch: &Branch,
+    place: impl Fn(&Point) -> Option<[f64; N]>,
+) -> Vec<(Kind, Option<&'static str>, [f64; N])> {
+    branch.special.iter().filter_map(|s| Some((s.kind, s.criticality(), place(&s.point)?))).collect()
 }
 
 fn place(point: &Point, x: Quantity, y: Quantity) -> Option<[f64; 2]> {

@@ -58,6 +58,8 @@ pub struct Panel {
     pub span: usize,
     /// Height including labels, in units of the SVG.
     pub height: f64,
+    /// True if the panel has neither grid nor frame: its layers draw the axes.
+    pub bare: bool,
 }
 
 impl Panel {
@@ -74,6 +76,7 @@ impl Panel {
             equal: false,
             span: 1,
             height: 340.0,
+            bare: false,
         }
     }
 
@@ -168,6 +171,8 @@ pub struct Layer {
     pub opacity: f64,
     /// True if lines without a style of their own are dashed.
     pub dashed: bool,
+    /// Small mark repeated along a curve, to tell it from others without its colour.
+    pub bead: Option<Marker>,
     /// Shape of the layer.
     pub shape: Shape,
 }
@@ -226,6 +231,13 @@ pub enum Shape {
     Label {
         /// Candidate points, best first.
         places: Vec<[f64; 2]>,
+        /// The text.
+        text: String,
+    },
+    /// Text centred at a point.
+    Text {
+        /// The point.
+        at: [f64; 2],
         /// The text.
         text: String,
     },
@@ -300,7 +312,7 @@ impl Marker {
 
 impl Layer {
     fn new(colour: &'static str, shape: Shape) -> Layer {
-        Layer { name: None, colour, width: 1.6, opacity: 1.0, dashed: false, shape }
+        Layer { name: None, colour, width: 1.6, opacity: 1.0, dashed: false, bead: None, shape }
     }
 
     /// Returns a polyline; a point that is not finite interrupts it.
@@ -352,6 +364,11 @@ impl Layer {
     /// Returns filled cells of a grid over `ranges`, row by row from below.
     pub fn cells(ranges: [[f64; 2]; 2], columns: usize, filled: Vec<bool>, colour: &'static str) -> Layer {
         Layer::new(colour, Shape::Cells { ranges, columns, filled })
+    }
+
+    /// Returns a text centred at a point.
+    pub fn text(at: [f64; 2], text: impl Into<String>) -> Layer {
+        Layer::new(GREY, Shape::Text { at, text: text.into() })
     }
 
     /// Returns a text beside a point.

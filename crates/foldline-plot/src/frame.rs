@@ -103,6 +103,9 @@ impl Frame {
     pub fn axes(&self, out: &mut String, panel: &Panel) {
         let Area { left, right, top, bottom } = self.area;
         let [w, h] = self.size();
+        if panel.bare {
+            return self.heading(out, panel);
+        }
         let _ = writeln!(
             out,
             "<rect x=\"{left:.2}\" y=\"{top:.2}\" width=\"{w:.2}\" height=\"{h:.2}\" fill=\"none\" stroke=\"#555\"/>\n\
@@ -178,6 +181,6 @@ fn places(layer: &Layer) -> Vec<[f64; 2]> {
         Shape::Stems { peaks, .. } => peaks.iter().flat_map(|[x, y]| [[*x, 0.0], [*x, *y]]).collect(),
         Shape::Cells { ranges: [[x0, x1], [y0, y1]], .. } => vec![[*x0, *y0], [*x1, *y1]],
         Shape::Vertical(_) | Shape::Horizontal(_) | Shape::Band(_) => Vec::new(),
-        Shape::Label { .. } | Shape::Note { .. } => Vec::new(),
+        Shape::Label { .. } | Shape::Note { .. } | Shape::Text { .. } => Vec::new(),
     }
 }

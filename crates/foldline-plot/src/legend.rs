@@ -3,7 +3,7 @@
 use crate::figure::{Layer, LegendPlace, Panel, Shape};
 use crate::font::width;
 use crate::frame::Frame;
-use crate::paint::{DASHES, mark, text_at};
+use crate::paint::{BEAD, DASHES, mark, text_at};
 use crate::palette::GREY;
 use crate::scale::SIZE;
 use std::fmt::Write;
@@ -49,7 +49,9 @@ impl Legend {
         for layer in panel.layers.iter().filter(|l| l.is_empty() || is_visible(l, frame)) {
             let Some(name) = &layer.name else { continue };
             match self.entries.iter_mut().find(|(known, _)| known == name) {
-                Some((_, sample)) if sample.colour != layer.colour => sample.colour = GREY,
+                Some((_, sample)) if sample.colour != layer.colour || sample.bead != layer.bead => {
+                    (sample.colour, sample.bead) = (GREY, None);
+                }
                 Some(_) => {}
                 None => self.entries.push((name.clone(), layer.clone())),
             }
@@ -145,6 +147,9 @@ fn entry(out: &mut String, left: f64, y: f64, name: &str, layer: &Layer) {
                 out,
                 "<path d=\"M{left:.2} {y:.2}h{SAMPLE}\" stroke=\"{colour}\" stroke-width=\"{width}\" opacity=\"{opacity}\"{dashes}/>"
             );
+            if let Some(bead) = layer.bead {
+                mark(out, bead, [middle, y], &Layer { width: BEAD, ..layer.clone() }, true);
+            }
         }
     }
     text_at(out, left + SAMPLE + GAP, y, name);

@@ -16,17 +16,25 @@ pub mod font;
 mod frame;
 mod legend;
 pub mod map;
+pub mod orbits;
 pub mod page;
 mod paint;
 pub mod palette;
+pub mod profile;
 pub mod quantity;
 #[cfg(feature = "render")]
 mod render;
 pub mod responses;
 mod scale;
+pub mod sections;
+pub mod space;
+pub mod spectra;
+pub mod spectrogram;
 mod texts;
+pub mod theme;
 pub mod ticks;
 pub mod tornado;
+pub mod waterfall;
 
 pub use branches::{branch_curve, branch_layers, deviation_layers, diagram_layers, special_layers};
 pub use compose::figure_svg;

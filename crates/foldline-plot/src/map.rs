@@ -20,7 +20,8 @@ const AREAS: [&str; 7] = [
 ];
 /// Colours of classes of a number, from small to large: equal steps of the lightness of one scale from dark blue to
 /// yellow, which stay in order without colour.
-const CLASSES: [&str; 8] = ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
+pub(crate) const CLASSES: [&str; 8] =
+    ["#440154", "#46327e", "#365c8d", "#277f8e", "#1fa187", "#4ac16d", "#a0da39", "#fde725"];
 /// Colour of cells without a value.
 const NONE: &str = "#c8c8c8";
 /// Least number of columns and rows of the picture if the values of a parameter are not equally spaced.

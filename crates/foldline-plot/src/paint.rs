@@ -10,6 +10,9 @@ use std::fmt::Write;
 /// Dashes and gaps of unstable curves and reference lines.
 pub(crate) const DASHES: &str = "5 3.5";
 const NOTE: f64 = 12.0;
+/// Distance between marks along a curve, and their size relative to special points.
+const BEADS: f64 = 62.0;
+pub(crate) const BEAD: f64 = 2.1;
 
 /// Contents of a panel except its axes and legend: lines first, marks over them, texts last.
 pub(crate) struct Painter<'f> {
@@ -40,7 +43,12 @@ impl<'f> Painter<'f> {
             let _ = writeln!(self.lines, "<title>{}</title>", escaped(name));
         }
         match &layer.shape {
-            Shape::Curve { stretches, rounded, .. } => self.curve(stretches, *rounded),
+            Shape::Curve { stretches, rounded, .. } => {
+                self.curve(stretches, *rounded);
+                if let Some(bead) = layer.bead {
+                    self.beads(layer, stretches, bead);
+                }
+            }
             Shape::Scatter { points, marker, filled } => self.scatter(layer, points, *marker, *filled),
             Shape::Circle { centre, radius } => self.circle(*centre, *radius, layer.dashed),
             Shape::Stems { peaks, labels } => self.stems(layer, peaks, labels),
@@ -58,6 +66,19 @@ impl<'f> Painter<'f> {
                 let seen = places.iter().map(|at| self.frame.units(*at)).filter(|at| self.frame.holds(*at));
                 let anchors = seen.map(|at| self.frame.at(at)).collect();
                 self.optional.push((anchors, text.clone(), layer.colour));
+            }
+            Shape::Text { at, text } => {
+                let at = self.frame.units(*at);
+                if at[0].is_finite() && at[1].is_finite() {
+                    let [x, y] = self.frame.at(at);
+                    let _ = writeln!(
+                        self.marks,
+                        "<text x=\"{x:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-size=\"{NOTE}\" fill=\"{}\">{}</text>",
+                        y + 0.36 * NOTE,
+                        layer.colour,
+                        escaped(text)
+                    );
+                }
             }
             Shape::Note { at, text } => {
                 let at = self.frame.units(*at);
@@ -81,6 +102,28 @@ impl<'f> Painter<'f> {
         let [x0, x1, y0, y1] = frame.window();
         for piece in cut(&stretches, rounded.then_some([x1 - x0, y1 - y0])) {
             self.path(&piece.vertices, !piece.stable);
+        }
+    }
+
+    /// Draws small marks at equal distances along the visible part of a curve.
+    fn beads(&mut self, layer: &Layer, stretches: &[Vec<crate::figure::Vertex>], bead: Marker) {
+        let style = Layer { width: BEAD, ..layer.clone() };
+        let mut left = 0.5 * BEADS;
+        for stretch in stretches {
+            let vertices: Vec<[f64; 2]> = stretch.iter().map(|(place, _)| self.frame.units(*place)).collect();
+            for part in self.frame.visible(&vertices) {
+                for pair in part.windows(2) {
+                    let [a, b] = [pair[0], pair[1]];
+                    let length = (b[0] - a[0]).hypot(b[1] - a[1]);
+                    while left <= length {
+                        let share = if length > 0.0 { left / length } else { 0.0 };
+                        let at = [0, 1].map(|i| a[i] + share * (b[i] - a[i]));
+                        mark(&mut self.marks, bead, at, &style, true);
+                        left += BEADS;
+                    }
+                    left -= length;
+                }
+            }
         }
     }
 

@@ -18,6 +18,8 @@ pub const SKY: &str = "#56b4e9";
 pub const BLACK: &str = "#000000";
 /// Yellow, faint on white.
 pub const YELLOW: &str = "#f0e442";
+/// Olive, legible on white unlike yellow; not part of the source.
+pub const OLIVE: &str = "#8c8400";
 /// Dark grey: text, and legend samples that stand for several colours.
 pub const GREY: &str = "#444444";
 /// Light grey: reference lines behind the curves.
@@ -25,5 +27,5 @@ pub const PALE: &str = "#9a9a9a";
 
 /// Returns the k-th colour, starting again after the last.
 pub fn nth(k: usize) -> &'static str {
-    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW][k % 8]
+    [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, OLIVE][k % 8]
 }

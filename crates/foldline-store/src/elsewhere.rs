@@ -4,7 +4,7 @@
 //! and the `range` of a parameter belongs to a branch.
 
 /// Words for a key, and the key. All are written in full: abbreviations are recognised by their letters.
-const MEANINGS: [(&[&str], &str); 13] = [
+const MEANINGS: [(&[&str], &str); 16] = [
     (&["ode", "odes", "rhs", "dynamics", "field", "system", "rates"], "equations"),
     (&["variables", "unknowns", "coordinates"], "states"),
     (&["settings", "arguments", "args"], "parameters"),
@@ -18,10 +18,16 @@ const MEANINGS: [(&[&str], &str); 13] = [
     (&["solution", "guess", "attractors"], "seed"),
     (&["locus", "loci", "codim2"], "curve"),
     (&["branching", "branch-at", "bifurcations"], "switch"),
+    (&["from", "branch", "on"], "of"),
+    (&["equilibrium", "fixed-point", "point", "guess", "initial", "x0", "values"], "state"),
+    (
+        &["optimise", "optimize", "optimisation", "optimization", "minimise", "minimize", "maximise", "maximize"],
+        "design",
+    ),
 ];
 
 /// Keys in a place, by the beginning of its name in messages, and where they belong.
-const PLACES: [(&str, &[&str], &str); 3] = [
+const PLACES: [(&str, &[&str], &str); 8] = [
     (
         "the parameter",
         &["range", "from", "to", "min", "max"],
@@ -37,6 +43,31 @@ const PLACES: [(&str, &[&str], &str); 3] = [
         "the model",
         &["seed", "branch", "curve", "survey", "sweep", "explore", "homotopy", "design"],
         "this belongs to a study, a second file, which names this one with `model = \"FILE\"`",
+    ),
+    (
+        "the model",
+        &["frequency", "period"],
+        "write it under `[forcing]`: `frequency = \"…\"` (angular) or `period = \"…\"`",
+    ),
+    (
+        "the study",
+        &["states", "equations", "forcing", "symmetry", "boundary", "interval", "integrals", "outputs", "definitions"],
+        "this belongs to the model, the file that the study names with `model = \"FILE\"`",
+    ),
+    (
+        "the study",
+        &["plot", "plots", "figure", "picture", "output"],
+        "pictures are drawn when the run has finished: `foldline plot runs/NAME -o FILE.svg`",
+    ),
+    (
+        "the study",
+        &["basin", "basins"],
+        "`foldline basins MODEL.toml` computes basins of attraction; over a parameter, write [[map]] with `what = \"shares\"`",
+    ),
+    (
+        "a branch",
+        &["direction", "directions", "both", "backward", "backwards"],
+        "a branch is followed in both directions, to the ends of its `range`; remove this",
     ),
 ];
 

@@ -16,5 +16,7 @@ pub mod nearest;
 pub mod order;
 pub mod run_file;
 pub mod short;
+mod slips;
 pub mod study_file;
+mod text_file;
 mod toml_walk;

@@ -3,18 +3,15 @@
 use crate::diagnostic::Diagnostic;
 use crate::elsewhere::{belongs, meant};
 use crate::nearest::{nearest, suggest};
+use crate::slips::{Slip, slip};
 use foldline::model::unsupported;
 use foldline::units::{self, Unit};
-use std::io::Read;
 use std::ops::Range;
-use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Largest number of mistakes reported for one file.
 const MOST: usize = 100;
-/// Largest file that is read, in bytes.
-const LARGEST: u64 = 64 << 20;
 /// Length in characters to which messages are cut. Hints may be twice as long; the parts of a line are cut to fractions
 /// of it.
 const LONGEST: usize = 400;
@@ -37,10 +34,8 @@ impl<'t> Walk<'t> {
             Ok(table) => Ok((walk, table.into_inner())),
             Err(error) => {
                 let span = error.span().unwrap_or(0..0);
-                let hint = unquoted(text, &span).unwrap_or_else(|| {
-                    "the file must be TOML: `key = value`, `[table]`, `[[list]]`; strings are in quotes".to_string()
-                });
-                walk.report(span, error.message(), hint);
+                let Slip { message, cure } = slip(text, file, &span, error.message());
+                walk.report(span, message.unwrap_or_else(|| error.message().to_string()), cure);
                 Err(walk.found)
             }
         }
@@ -62,14 +57,15 @@ impl<'t> Walk<'t> {
             if known.contains(&name) {
                 continue;
             }
-            let spelt = nearest(name, known.iter().copied());
-            let instead = spelt.or_else(|| meant(name, known)).filter(|own| !table.contains_key(*own));
-            let (message, hint) = match (belongs(name, whose), unsupported(name), instead) {
+            let absent = |own: &&str| !table.contains_key(*own);
+            let (spelt, other) = (nearest(name, known.iter().copied()), meant(name, known).filter(absent));
+            let instead = spelt.filter(absent).or(other);
+            let (message, hint) = match (belongs(name, whose), unsupported(name), other) {
                 (Some(place), ..) => (format!("unknown key `{name}` in {whose}"), place.to_string()),
-                (_, Some(kind), _) => (format!("`{name}` in {whose}: {}", kind.message), kind.instead.to_string()),
                 (.., Some(key)) if spelt.is_none() => {
                     (format!("unknown key `{name}` in {whose}"), format!("the key for this is `{key}`"))
                 }
+                (_, Some(kind), _) => (format!("`{name}` in {whose}: {}", kind.message), kind.instead.to_string()),
                 _ => (format!("unknown key `{name}` in {whose}"), suggest(name, known)),
             };
             self.report(key.span(), message, hint);
@@ -223,15 +219,6 @@ impl<'t> Walk<'t> {
     }
 }
 
-/// Hint for a line whose key has a mark that TOML accepts only in quotes, such as `x' = "v"`.
-fn unquoted(text: &str, span: &Range<usize>) -> Option<String> {
-    let begin = text.get(..span.start)?.rfind('\n').map_or(0, |end| end + 1);
-    let line = text.get(begin..)?.lines().next()?;
-    let key = line.split_once('=')?.0.trim();
-    let marked = key.ends_with(['\'', ']', ')']) && !key.starts_with(['"', '\'', '[', '{']);
-    marked.then(|| format!("write the name in quotes: `\"{key}\" = …`"))
-}
-
 /// The noun with its indefinite article: `a table`, `an array`.
 pub(crate) fn with_article(noun: &str) -> String {
     let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
@@ -286,27 +273,6 @@ fn visible(text: &str) -> String {
         return text.to_string();
     }
     text.chars().map(|c| if hidden(c) { c.escape_unicode().to_string() } else { c.to_string() }).collect()
-}
-
-/// Reads a text file; fails if it is longer than [`LARGEST`] or not UTF-8.
-pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
-    let mut text = String::new();
-    let length = std::fs::File::open(path)?.take(LARGEST + 1).read_to_string(&mut text)?;
-    match length as u64 > LARGEST {
-        true => Err(std::io::Error::other(format!("it is longer than {} MiB", LARGEST >> 20))),
-        false => Ok(text),
-    }
-}
-
-/// Returns a diagnostic for a file that could not be read.
-pub(crate) fn unreadable(file: &str, what: &str, error: &std::io::Error) -> Diagnostic {
-    let hint = match error.kind() {
-        std::io::ErrorKind::NotFound => "check the spelling of the path; relative paths start at the current folder",
-        std::io::ErrorKind::PermissionDenied => "make the file readable, or run as a user who may read it",
-        std::io::ErrorKind::InvalidData => "save the file as UTF-8 text",
-        _ => "check that the path names a readable text file",
-    };
-    diagnose(file, "", 0..0, format!("{what} cannot be read: {error}"), hint.to_string())
 }
 
 #[cfg(test)]

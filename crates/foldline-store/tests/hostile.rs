@@ -95,7 +95,7 @@ fn names_that_clash() {
         clash("[parameters]\nx = 1\n[states]\nx = \"-x\"\n"),
         "the name `x` is used twice: it is already a parameter"
     );
-    assert!(clash("[states]\nx = \"-x\"\nx = \"x\"\n").contains("duplicate key"));
+    assert!(clash("[states]\nx = \"-x\"\nx = \"x\"\n").contains("`x` is given twice"));
 }
 
 #[test]

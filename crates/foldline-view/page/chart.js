@@ -7,6 +7,7 @@ import { Axis, around } from "./axis.js";
 import { themeColours } from "./colours.js";
 import { make } from "./dom.js";
 import { CanvasSurface, SvgSurface } from "./draw.js";
+import { PdfSurface } from "./pdf.js";
 
 /** Part of the frame by which the bitmap reaches beyond it. */
 const BEYOND = 0.25;
@@ -27,6 +28,7 @@ const VIEWS = 100;
  *   viewed?: () => void,
  *   equal?: () => boolean,
  *   plain?: () => boolean,
+ *   rows?: () => boolean,
  *   small?: boolean,
  * }} Options
  */
@@ -279,7 +281,8 @@ export class Chart {
     const { left, top, right, bottom } = this.box;
     const small = this.options.small;
     const xs = this.x.ticks((right - left) / (small ? 42 : 90));
-    const ys = this.y.ticks((bottom - top) / (small ? 30 : 50));
+    // The vertical axis of rows has no numbers.
+    const ys = this.options.rows?.() ? [] : this.y.ticks((bottom - top) / (small ? 30 : 50));
     const line = (x0, y0, x1, y1, stroke, width = 1) => surface.line([x0, x1], [y0, y1], 2, { stroke, width });
     const px = (tick) => Math.round(this.x.pixelOfEven(tick.at)) + 0.5;
     const py = (tick) => Math.round(this.y.pixelOfEven(tick.at)) + 0.5;
@@ -308,8 +311,17 @@ export class Chart {
 
   /** The chart as SVG text. */
   svg(title) {
+    return this.onto(new SvgSurface(Math.round(this.width), Math.round(this.height), themeColours().font, title));
+  }
+
+  /** The chart as the text of a PDF. */
+  pdf() {
+    return this.onto(new PdfSurface(Math.round(this.width), Math.round(this.height)));
+  }
+
+  /** Draws onto a surface, and returns its picture. */
+  onto(surface) {
     const theme = themeColours();
-    const surface = new SvgSurface(Math.round(this.width), Math.round(this.height), theme.font, title);
     const { left, top, right, bottom } = this.box;
     this.axes(surface, theme, true);
     surface.clip(left, top, right - left, bottom - top);

@@ -216,8 +216,8 @@ export class Log {
   show() {
     const { state, about } = this.run;
     const notes = state.notes.length + state.shortfalls.length;
-    const all = [["ends", "Ends"], ["notes", `Notes (${notes})`], ["study", "Study"], ["model", "Model"]];
-    const now = JSON.stringify([this.tab, this.run.epoch, this.run.changes]);
+    const all = [["ends", "Ends"], ["notes", `Notes (${notes})`], ["study", "Study"], ["model", "Model"], ...(this.desk?.verified ? [["verified", "Verification"]] : [])];
+    const now = JSON.stringify([this.tab, this.run.epoch, this.run.changes, this.desk?.verified?.text]);
     if (now === this.shown) return;
     // An editor keeps its place and its focus.
     const panel = this.desk?.panels[this.tab];
@@ -236,6 +236,7 @@ export class Log {
     const panel = this.desk?.panels[this.tab];
     if (panel) return panel;
     if (this.tab === "study" || this.tab === "model") return make("pre", { text: about[this.tab].text, "aria-label": about[this.tab].file });
+    if (this.tab === "verified") return this.desk.verification();
     const rows = this.tab === "ends" ? this.ends(state) : this.notes(state);
     return make("table", {}, make("tbody", {}, ...rows));
   }

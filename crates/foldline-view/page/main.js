@@ -8,8 +8,8 @@ import { BranchList, Log, showPoint, SpecialTable } from "./lists.js";
 import { greek } from "./numbers.js";
 import { OrbitPanel, Solution } from "./orbit.js";
 import { Run } from "./run.js";
-import { csvText, saveCsv, savePng, saveSvg } from "./save.js";
-import { source } from "./source.js";
+import { csvText, saveCsv, savePage, savePdf, savePng, saveSvg } from "./save.js";
+import { savedView, source } from "./source.js";
 import { MultipliersPanel, SpectrumPanel } from "./spectrum.js";
 import { Desk, Pace, showExamples } from "./study.js";
 
@@ -64,7 +64,7 @@ class App {
     this.tabs();
     this.keys();
     await this.run.refresh();
-    const asked = new URLSearchParams(location.hash.slice(1));
+    const asked = new URLSearchParams((location.hash || savedView()).slice(1));
     const named = (key, fallback) => {
       const found = this.run.quantity(asked.get(key) ?? "");
       return found >= 0 ? found : fallback;
@@ -281,10 +281,22 @@ class App {
     byId("saving").replaceChildren(
       button("SVG", "Save the diagram as SVG", () => saveSvg(this.run, this.diagram)),
       button("PNG", "Save the diagram as PNG", () => savePng(this.run, this.diagram)),
-      button("CSV", "Save the branches shown as CSV", () => saveCsv(this.run, this.diagram)));
+      button("PDF", "Save the diagram as PDF", () => savePdf(this.run, this.diagram)),
+      button("CSV", "Save the branches shown as CSV", () => saveCsv(this.run, this.diagram)),
+      ...(this.run.source.live ? [button("HTML", "Save the whole page as one file that opens without foldline", () => this.savePage())] : []));
     byId("help").onclick = showKeys;
     byId("copy").onclick = () => this.copy();
     this.walk();
+  }
+
+  async savePage() {
+    this.tell("Collecting the results …");
+    try {
+      await savePage(this.run);
+      this.tell("Saved. The file opens in any browser, without foldline and without a network.");
+    } catch (error) {
+      this.tell(`The page cannot be saved: ${error.message}`);
+    }
   }
 
   tabs() {
@@ -527,7 +539,7 @@ class App {
 
 const app = new App();
 // For tests and for the console of the browser.
-window.foldline = { app, csv: () => csvText(app.run, app.diagram), svg: () => app.diagram.chart.svg("foldline") };
+window.foldline = { app, csv: () => csvText(app.run, app.diagram), svg: () => app.diagram.chart.svg("foldline"), pdf: () => app.diagram.chart.pdf() };
 app.begin().catch((error) => {
   byId("status").textContent = `The run cannot be shown: ${error.message}`;
 });

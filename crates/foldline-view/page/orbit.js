@@ -19,7 +19,11 @@ export class Solution {
     this.rows = frame.header.rows;
     this.times = frame.columns[0] ?? new Float64Array(0);
     this.values = frame.columns.slice(1, 1 + channels.length);
-    this.harmonics = frame.columns.slice(1 + channels.length);
+    const names = frame.header.switches ?? [];
+    const last = frame.columns.length - (this.rows > 0 ? names.length : 0);
+    this.harmonics = frame.columns.slice(1 + channels.length, last);
+    /** Switching functions along the orbit, with their names. */
+    this.switches = names.map((name, k) => ({ name, values: frame.columns[last + k] ?? new Float64Array(0) }));
   }
 
   get isCycle() {
@@ -39,6 +43,24 @@ export class Solution {
     const part = high > low ? (time - times[low]) / (times[high] - times[low]) : 0;
     return values[low] + Math.max(0, Math.min(1, part)) * (values[high] - values[low]);
   }
+}
+
+/** Intervals of time in which values are positive; where they pass zero is interpolated. */
+export function positive(times, values) {
+  const found = [];
+  let start = values[0] > 0 ? times[0] : null;
+  for (let k = 1; k < times.length; k += 1) {
+    const [a, b] = [values[k - 1], values[k]];
+    if (a > 0 === b > 0) continue;
+    const at = times[k - 1] + (a / (a - b)) * (times[k] - times[k - 1]);
+    if (b > 0) start = at;
+    else {
+      found.push([start ?? times[0], at]);
+      start = null;
+    }
+  }
+  if (start !== null) found.push([start, times[times.length - 1]]);
+  return found;
 }
 
 /** The panel. */
@@ -63,6 +85,7 @@ export class OrbitPanel {
       extent: () => this.extent(),
       equal: () => this.mode === "3d" || (this.mode === "phase" && this.isWhirl()),
       plain: () => this.mode === "3d",
+      rows: () => this.mode === "contact",
       drag: (dx, dy) => this.rotate(dx, dy),
     });
   }
@@ -83,11 +106,12 @@ export class OrbitPanel {
   }
 
   showControls() {
-    const modes = [["phase", "Phase"], ["time", "Time"], ["3d", "3-D"]].map(([mode, text]) =>
+    const kinds = [["phase", "Phase"], ["time", "Time"], ["3d", "3-D"], ...(this.about.switches > 0 ? [["contact", "Contact"]] : [])];
+    const modes = kinds.map(([mode, text]) =>
       button(text, `Show as ${text}`, () => this.setMode(mode), this.mode === mode));
     const group = make("span", { class: "buttons", role: "group", "aria-label": "Kind of picture" }, ...modes);
     const names = [["", this.about.channels.map((own, k) => [String(k), greek(own.name)])]];
-    const axes = { phase: ["Horizontal axis", "Vertical axis"], time: [null, "Quantity"], "3d": ["First axis", "Second axis", "Third axis"] }[this.mode];
+    const axes = { phase: ["Horizontal axis", "Vertical axis"], time: [null, "Quantity"], "3d": ["First axis", "Second axis", "Third axis"], contact: [] }[this.mode];
     const lists = axes.map((label, k) => (label ? choice(label, names, String(this.chosen[k]), (value) => this.choose(k, Number(value))) : null));
     this.controls.replaceChildren(group, ...lists.filter((own) => own !== null));
     this.button = button(this.playing ? "Pause" : "Play", "Move a point along the orbit (p)", () => this.toggle(), this.playing);
@@ -132,7 +156,9 @@ export class OrbitPanel {
     const label = (k) => labelled(greek(this.about.channels[k].name), this.about.channels[k].unit);
     const time = labelled("t", this.about.time);
     const [x, y] = this.chosen;
-    this.chart.labels = { phase: { x: label(x), y: label(y) }, time: { x: time, y: label(y) }, "3d": { x: "", y: "" } }[this.mode];
+    this.chart.labels = { phase: { x: label(x), y: label(y) }, time: { x: time, y: label(y) }, "3d": { x: "", y: "" }, contact: { x: time, y: "" } }[this.mode];
+    const rests = this.mode === "contact" && solution !== null && !solution.isCycle;
+    if (rests) this.chart.empty.textContent = "An equilibrium has no contact sequence.";
     this.chart.changed();
     this.tell();
   }
@@ -179,6 +205,9 @@ export class OrbitPanel {
   extent() {
     if (!this.solution || this.solution.rows === 0) return null;
     if (this.mode === "3d") return { x: [-1.75, 1.75], y: [-1.6, 1.6] };
+    if (this.mode === "contact") {
+      return this.solution.isCycle ? { x: [0, this.solution.header.period], y: [0, Math.max(1, this.solution.switches.length)] } : null;
+    }
     const map = this.mapped();
     const box = [Infinity, -Infinity, Infinity, -Infinity];
     for (let k = 0; k < this.solution.rows; k += 1) {
@@ -199,6 +228,10 @@ export class OrbitPanel {
     const own = this.solution;
     if (!own || own.rows === 0) return;
     const colour = branchColour(this.colour, theme.dark);
+    if (this.mode === "contact") {
+      this.drawContact(surface, x, y, theme, colour);
+      return;
+    }
     const map = this.mapped();
     if (this.mode === "3d") this.drawCube(surface, x, y, theme);
     if (own.rows === 1) {
@@ -222,6 +255,26 @@ export class OrbitPanel {
       levels[level][1].push(py[k - 1], py[k], NaN);
     }
     levels.forEach(([xs, ys], level) => surface.line(xs, ys, xs.length, { ...style, alpha: 0.3 + (0.7 * level) / (LEVELS - 1) }));
+  }
+
+  /** A row for each switching function, filled while it is positive. */
+  drawContact(surface, x, y, theme, colour) {
+    const { switches, times, header } = this.solution;
+    switches.forEach(({ name, values }, k) => {
+      const [top, bottom] = [0.55, 0.12].map((part) => y.pixelOfEven(switches.length - 1 - k + part));
+      surface.line([x.pixelOfEven(0), x.pixelOfEven(header.period)], [bottom, bottom], 2, { stroke: theme.faint });
+      for (const [from, to] of positive(times, values)) {
+        const [a, b] = [x.pixelOfEven(from * header.period), x.pixelOfEven(to * header.period)];
+        surface.shape((path) => {
+          path.moveTo(a, top);
+          path.lineTo(b, top);
+          path.lineTo(b, bottom);
+          path.lineTo(a, bottom);
+          path.closePath();
+        }, { fill: colour });
+      }
+      surface.text(`${name} > 0`, x.pixelOfEven(0) + 4, y.pixelOfEven(switches.length - 1 - k + 0.76), { size: 10, colour: theme.fg });
+    });
   }
 
   drawCube(surface, x, y, theme) {
@@ -259,6 +312,11 @@ export class OrbitPanel {
   overlay(surface, x, y, theme) {
     const own = this.solution;
     if (!own || own.rows < 2) return;
+    if (this.mode === "contact") {
+      const px = x.pixelOfEven(this.time * own.header.period);
+      surface.line([px, px], [y.from, y.to], 2, { stroke: theme.fg, width: 1.2 });
+      return;
+    }
     const [a, b] = this.mappedAt(this.time);
     const [px, py] = [x.pixelOfEven(a), y.pixelOfEven(b)];
     surface.shape((path) => path.arc(px, py, 5, 0, 2 * Math.PI), { fill: theme.fg, stroke: theme.panel, width: 1.5 });

@@ -16,6 +16,22 @@ export function saveSvg(run, diagram) {
   download(`${fileName(run, diagram)}.svg`, diagram.chart.svg(run.about.model.name), "image/svg+xml");
 }
 
+export function savePdf(run, diagram) {
+  download(`${fileName(run, diagram)}.pdf`, diagram.chart.pdf(), "application/pdf");
+}
+
+/** Beginning of an element with data. This script is part of a page, so the name of the element may not follow a bracket. */
+const TAG = "script";
+const data = (id) => `<${TAG} type="application/json" id="data-${id}">`;
+
+/** Saves the whole page with its data, so that it opens without a server; it shows the view of now. */
+export async function savePage(run) {
+  const page = await run.source.page();
+  const view = `${data("view")}${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}</${TAG}>\n`;
+  const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
+  download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(data("run"), (found) => view + found), "text/html");
+}
+
 export async function savePng(run, diagram) {
   const image = await diagram.chart.png();
   if (image) download(`${fileName(run, diagram)}.png`, image, "image/png");

@@ -8,6 +8,7 @@
  *   state: () => Promise<any>,
  *   points: (epoch: number, since: number, columns: number[]) => Promise<Frame>,
  *   solution: (branch: number, position: number, special: number) => Promise<Frame | null>,
+ *   page: () => Promise<string>,
  *   order: (what: string, body: any) => Promise<any>,
  *   listen: (heard: (notice: any) => void, lost: (isLost: boolean) => void) => void,
  * }} Source
@@ -37,7 +38,8 @@ const ofPoints = (header) => (header.restart ? [] : new Array(3 + header.columns
 const ofSolution = (header) => {
   if (header.rows === 0) return [];
   const orbit = new Array(1 + header.channels).fill(header.rows);
-  return header.harmonics > 0 ? orbit.concat(new Array(2 * header.channels).fill(header.harmonics)) : orbit;
+  const harmonics = header.harmonics > 0 ? new Array(2 * header.channels).fill(header.harmonics) : [];
+  return orbit.concat(harmonics, new Array(header.switches?.length ?? 0).fill(header.rows));
 };
 
 /** @returns {Source} */
@@ -60,6 +62,11 @@ function server() {
       const place = special >= 0 ? `special=${special}` : `position=${position}`;
       const answer = await get(`/api/solution?branch=${branch}&${place}`);
       return answer && frameOf(await answer.arrayBuffer(), ofSolution);
+    },
+    page: async () => {
+      const answer = await fetch("/api/export", { credentials: "same-origin" });
+      if (!answer.ok) throw new Error(answer.status === 404 ? "there are no results yet" : "the run is too large to save from here; `foldline export DIR --format html` writes it");
+      return answer.text();
     },
     order: async (what, body) => {
       const answer = await fetch(`/api/${what}`, { method: "POST", credentials: "same-origin", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) });
@@ -126,11 +133,20 @@ function embedded() {
       }
       return null;
     },
+    page: async () => {
+      throw new Error("this page is saved already");
+    },
     order: async () => {
       throw new Error("a saved page computes nothing");
     },
     listen: () => {},
   };
+}
+
+/** The view with which a saved page opens. */
+export function savedView() {
+  const text = document.getElementById("data-view")?.textContent;
+  return text ? JSON.parse(text) : "";
 }
 
 /** The source of this page. */

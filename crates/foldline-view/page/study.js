@@ -5,7 +5,7 @@
 
 import { button, byId, choice, copied, make } from "./dom.js";
 import { Editor } from "./editor.js";
-import { greek } from "./numbers.js";
+import { greek, magnitude } from "./numbers.js";
 
 /** Kinds of special points at which branches leave, and those that are followed in two parameters. */
 const LEAVING = ["period-doubling", "branch-point", "hopf"];
@@ -169,6 +169,8 @@ export class Desk {
     const at = branch && { branch: place.branch, position: place.position, special: place.special };
     const press = (text, label, action, free) => button(text, label, () => this.act(at, action, free ? this.free : undefined));
     const found = [];
+    const verify = button("Verify", "Recompute this point by an independent method", () => this.verify(at));
+    if (this.fixed !== null) return [verify];
     if (special && !isCurve && LEAVING.includes(special.kind)) found.push(press("Switch here", "Follow the branch that leaves here", "switch"));
     const inOther = parameters.length > 0 && !isCurve;
     if (inOther) {
@@ -182,7 +184,36 @@ export class Desk {
       found.push(press("Sweep ↓", "Simulate at decreasing values of the parameter, from here", "down"));
     }
     found.push(press("Attractors", "Sample initial states at this value of the parameter", "survey"));
+    found.push(verify);
     return found;
+  }
+
+  /** Recomputes a place by an independent method, and shows the differences beside the stated errors. */
+  async verify(place) {
+    const { name } = this.run.branches.get(place.branch).about;
+    this.heard.tell(`Verifying ${name} …`);
+    try {
+      const { checks, wrong, undecided, removed } = await this.run.source.order("verify", place);
+      const rows = checks.filter((own) => own.found !== 0 || own.stated !== null);
+      const said = removed > 0 ? "its profile was not kept (store in the study)"
+        : checks.length === 0 ? `nothing could be compared: ${undecided[0] ?? "the method does not apply here"}`
+        : wrong > 0 ? `${wrong} of ${checks.length} differences are larger than the stated errors` : checks.length === 1 ? "the difference is within the stated error" : `all ${checks.length} differences are within the stated errors`;
+      const text = `${name}, position ${place.position}: ${said}.`;
+      this.verified = { text, rows, undecided: checks.length > 0 ? undecided : [] };
+      this.heard.open("verified");
+      this.heard.tell(text);
+    } catch (error) {
+      this.heard.tell(`This point cannot be verified: ${error.message}`);
+    }
+  }
+
+  /** The latest verification as a table. */
+  verification() {
+    const { text, rows, undecided } = this.verified;
+    const head = make("tr", {}, ...["quantity", "difference found", "error stated", "ratio"].map((own, k) => make("th", { text: own, class: k > 0 ? "number" : "" })));
+    const row = (own) => make("tr", { class: own.ratio > 1 ? "bad" : "" }, make("td", { text: own.quantity }), ...[own.found, own.stated, own.ratio].map((value) => make("td", { class: "number", text: magnitude(value) })));
+    const table = make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows.map(row)));
+    return make("div", {}, make("p", { text }), ...(rows.length > 0 ? [table] : []), ...undecided.map((why) => make("p", { text: `undecided: ${why}` })));
   }
 
   /** Shows what can be computed from the selected place. */
@@ -191,7 +222,7 @@ export class Desk {
     const key = branch ? JSON.stringify([branch.id, place.special, branch.special[place.special]?.kind, branch.about.held, this.fixed]) : "";
     if (key === this.offered) return;
     this.offered = key;
-    host.hidden = !branch || this.fixed !== null;
+    host.hidden = !branch;
     host.replaceChildren(...(host.hidden ? [] : [make("span", { class: "lead", text: "From here:" }), ...this.actions(branch, place)]));
   }
 }

@@ -39,6 +39,7 @@ pub(crate) fn described(study: &Study, quantities: &[Quantity], folder: &Path) -
         "states": model.states.len(),
         "time": model.time,
         "whirl": model.whirl,
+        "switches": model.switch_count(),
         "kinds": Kind::ALL.map(|kind| json!({ "name": kind.name(), "title": kind.title(), "two": kind.has_codimension_two() })).to_vec(),
     })
 }

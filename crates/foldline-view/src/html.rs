@@ -36,6 +36,10 @@ pub fn html(folder: &Path) -> Result<(String, Amount), Failure> {
     let mut description = watch.description();
     // The file may be passed on; a path of this computer does not belong in it.
     description["folder"] = folder.file_name().map(|name| name.to_string_lossy()).into();
+    for part in ["study", "model"] {
+        let name = description[part]["file"].as_str().and_then(|file| file.rsplit(['/', '\\']).next());
+        description[part]["file"] = name.map(str::to_string).into();
+    }
     data.push(script_of("run", "application/json", &escaped(&description.to_string())));
     data.push(script_of("state", "application/json", &escaped(&state)));
     let columns: Vec<usize> = (0..watch.quantities()).collect();

@@ -31,7 +31,8 @@ const SAMPLES: usize = 512;
 const HIGHEST: usize = 40;
 
 /// Returns header and columns of a solution. For a cycle these are the time, every state and output along the orbit,
-/// and then real and imaginary parts of the harmonics of each. For an equilibrium there is one row.
+/// then real and imaginary parts of the harmonics of each, and the switching functions along the orbit, which are
+/// positive on one side of a contact. For an equilibrium there is one row.
 pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) -> (Value, Vec<Vec<f64>>) {
     let values: Vec<Option<f64>> = quantities.iter().map(|quantity| quantity.of(point)).collect();
     let trust = point.trust;
@@ -47,6 +48,7 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
         },
         "newton": point.cost.newton,
     });
+    let mut switches = Vec::new();
     let (times, harmonics, columns) = match &point.solution {
         Solution::Equilibrium(state) => (vec![0.0], 0, channels(model, &point.parameters, state.clone(), &[0.0])),
         Solution::Cycle(cycle) if point.solution.is_stored() && cycle.intervals() > 0 => {
@@ -54,9 +56,10 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
             header["mesh"] = cycle.mesh.to_vec().into();
             header["degree"] = cycle.degree.into();
             let times = places(cycle);
-            let states = times.iter().flat_map(|time| cycle.state(*time)).collect();
+            let states: Vec<f64> = times.iter().flat_map(|time| cycle.state(*time)).collect();
             let forcing = f64::from(cycle.forcing_periods);
             let clock: Vec<f64> = times.iter().map(|time| time * forcing).collect();
+            switches = switched(model, &point.parameters, &states, &clock);
             let mut columns = channels(model, &point.parameters, states, &clock);
             close(&mut columns, model, cycle);
             let clock: Vec<f64> = (0..SAMPLES).map(|s| s as f64 / SAMPLES as f64 * forcing).collect();
@@ -89,10 +92,11 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
             (Vec::new(), 0, Vec::new())
         }
     };
+    header["switches"] = (0..switches.len()).map(|k| model.switch_name(k)).collect::<Vec<_>>().into();
     header["rows"] = times.len().into();
     header["harmonics"] = harmonics.into();
     header["channels"] = (model.states.len() + model.outputs.len()).into();
-    let out = if times.is_empty() { Vec::new() } else { [vec![times], columns].concat() };
+    let out = if times.is_empty() { Vec::new() } else { [vec![times], columns, switches].concat() };
     (header, out)
 }
 
@@ -115,6 +119,20 @@ fn close(columns: &mut [Vec<f64>], model: &Model, cycle: &Cycle) {
             *last = first + gain;
         }
     }
+}
+
+/// Returns the switching functions as columns; arguments as for [`channels`].
+fn switched(model: &Model, parameters: &[f64], states: &[f64], clock: &[f64]) -> Vec<Vec<f64>> {
+    let (n, lanes, count) = (model.states.len(), clock.len(), model.switch_count());
+    if count == 0 || parameters.len() != model.parameters.len() {
+        return Vec::new();
+    }
+    let transposed: Vec<f64> = (0..n * lanes).map(|k| states[(k % lanes) * n + k / lanes]).collect();
+    let times = if model.forced() { clock } else { &[] };
+    let at = Batch { lanes, states: &transposed, parameters: Parameters::Shared(parameters), times, signs: &[] };
+    let mut out = vec![f64::NAN; count * lanes];
+    model.switches(at, &mut out);
+    out.chunks(lanes).map(<[f64]>::to_vec).collect()
 }
 
 /// Returns states and outputs as columns; `states` is `[place][state]`, `clock` the time in forcing periods.

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `/api/check` | `study` or `model`, a text | its mistakes, with line and column |
 //! | `/api/act` | `branch`, `position` or `special`, `action`, perhaps `free` | the longer study, and which of its lines are new |
+//! | `/api/verify` | `branch`, `position` or `special` | the differences to an independent computation, with the errors stated |
 //! | `/api/study` | `before`, `text` | nothing; the run goes on with the text |
 //! | `/api/new` | `model`, `study`, two texts | nothing; they are computed from the beginning, in a new folder |
 //! | `/api/example` | `index` | nothing; the page shows the example, of which nothing is computed |
@@ -12,6 +13,7 @@
 use crate::desk::{Desk, Refused};
 use crate::orbit::Place;
 use crate::watch::Watch;
+use foldline::verify::Check;
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::model_file::parse_model;
 use foldline_store::study_file::{self, Action, Refusal, parse_study};
@@ -19,8 +21,8 @@ use hyper::StatusCode;
 use serde_json::{Value, json};
 
 /// Paths of these requests.
-const PATHS: [&str; 7] =
-    ["/api/check", "/api/act", "/api/study", "/api/new", "/api/example", "/api/stop", "/api/resume"];
+const PATHS: [&str; 8] =
+    ["/api/check", "/api/act", "/api/verify", "/api/study", "/api/new", "/api/example", "/api/stop", "/api/resume"];
 /// Largest body, in bytes.
 pub(crate) const LARGEST: u64 = 1 << 20;
 
@@ -44,6 +46,10 @@ pub(crate) fn carried_out(path: &str, body: &[u8], watch: &Watch, desk: Option<&
         ("/api/act", _) => match action(&body) {
             Some((branch, place, action)) => act(watch, branch, place, &action),
             None => return bad("the action is not known"),
+        },
+        ("/api/verify", _) => match place(&body) {
+            Some((branch, place)) => verified(watch, branch, place),
+            None => return bad("the point is missing"),
         },
         (_, None) => Err(Refused::Because(watch.why_not().unwrap_or_default())),
         ("/api/study", Some(desk)) => match (text("before"), text("text")) {
@@ -100,14 +106,20 @@ fn check_model(watch: &Watch, text: &str) -> Value {
     json!({ "mistakes": mistakes(&found.err().unwrap_or_default()) })
 }
 
-/// Branch, place and action of a request.
-fn action(body: &Value) -> Option<(i64, Place, Action)> {
+/// Branch and place of a request.
+fn place(body: &Value) -> Option<(i64, Place)> {
     let number = |key: &str| body.get(key).and_then(Value::as_i64);
     let place = match (number("position"), number("special").filter(|index| *index >= 0)) {
         (_, Some(index)) => Place::Special(index),
         (Some(position), None) => Place::Position(position),
         _ => return None,
     };
+    Some((number("branch")?, place))
+}
+
+/// Branch, place and action of a request.
+fn action(body: &Value) -> Option<(i64, Place, Action)> {
+    let (branch, place) = place(body)?;
     let free = || body.get("free").and_then(Value::as_str).map(str::to_string);
     let action = match body.get("action")?.as_str()? {
         "continue" => Action::Continue { free: free()? },
@@ -119,7 +131,17 @@ fn action(body: &Value) -> Option<(i64, Place, Action)> {
         "survey" => Action::Survey,
         _ => return None,
     };
-    Some((number("branch")?, place, action))
+    Some((branch, place, action))
+}
+
+/// Comparisons of a point with an independent computation.
+fn verified(watch: &Watch, branch: i64, place: Place) -> Result<Value, Refused> {
+    let found = watch.verified(branch, place).map_err(|error| error.to_string())?;
+    let found = found.ok_or_else(|| "there is no such point".to_string())?;
+    let check = |own: &Check| json!({ "quantity": own.quantity.name(), "stated": own.stated, "found": own.found, "ratio": own.ratio() });
+    let checks: Vec<Value> = found.checks.iter().map(check).collect();
+    let undecided: Vec<&str> = found.undecided.iter().map(|own| own.why).collect();
+    Ok(json!({ "checks": checks, "wrong": found.wrong().count(), "undecided": undecided, "removed": found.removed }))
 }
 
 fn act(watch: &Watch, branch: i64, place: Place, action: &Action) -> Result<Value, Refused> {

@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 /// Modules of the script, each after those that it imports.
-const MODULES: [&str; 17] = [
+const MODULES: [&str; 18] = [
     include_str!("../page/numbers.js"),
     include_str!("../page/colours.js"),
     include_str!("../page/dom.js"),
@@ -15,6 +15,7 @@ const MODULES: [&str; 17] = [
     include_str!("../page/run.js"),
     include_str!("../page/axis.js"),
     include_str!("../page/draw.js"),
+    include_str!("../page/pdf.js"),
     include_str!("../page/chart.js"),
     include_str!("../page/diagram.js"),
     include_str!("../page/orbit.js"),
@@ -72,6 +73,11 @@ pub(crate) fn asset(path: &str) -> Option<(&'static str, &'static str)> {
 #[cfg(test)]
 mod tests {
     use super::{joined, script};
+
+    #[test]
+    fn the_script_does_not_end_the_element_that_contains_it() {
+        assert!(!script().to_lowercase().contains("</script"));
+    }
 
     #[test]
     fn imports_and_exports_disappear() {

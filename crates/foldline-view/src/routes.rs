@@ -7,12 +7,14 @@
 //! | `/api/state` | branches, special points, ends, notes (JSON) |
 //! | `/api/points?epoch=E&since=N&columns=K,K,...` | points from cursor N on ([`frame`](crate::frame)) |
 //! | `/api/solution?branch=B&position=P` or `&special=K` | one solution (frame) |
+//! | `/api/export` | the run as one page (HTML, to be saved) |
 //! | `/api/events` | `grew` whenever something has changed (server-sent events) |
 //! | POST | see [`orders`](crate::orders) |
 
 use crate::body::{Answer, First, first};
 use crate::desk::Desk;
 use crate::gate::{Entry, Gate};
+use crate::html::html;
 use crate::orbit::Place;
 use crate::orders;
 use crate::page;
@@ -155,6 +157,7 @@ impl Routes {
         match path {
             "/api/run" => Ok(Asked::Run),
             "/api/state" => Ok(Asked::State),
+            "/api/export" => Ok(Asked::Export),
             "/api/points" => {
                 let columns = query.indices("columns", self.watch.quantities(), COLUMNS).ok_or(bad)?;
                 Ok(Asked::Points { epoch: natural("epoch")?, since: natural("since")?, columns })
@@ -224,6 +227,7 @@ impl Watching {
 enum Asked {
     Run,
     State,
+    Export,
     Points { epoch: u64, since: u64, columns: Vec<usize> },
     Solution { branch: i64, place: Place },
 }
@@ -234,6 +238,11 @@ impl Asked {
         match self {
             Asked::Run => Ok((JSON, watch.description().to_string().into_bytes())),
             Asked::State => Ok((JSON, watch.state().into_bytes())),
+            // Not as a document: it would have the origin of the server.
+            Asked::Export => match html(&watch.folder()) {
+                Ok((page, _)) => Ok((BYTES, page.into_bytes())),
+                Err(_) => Err(StatusCode::NOT_FOUND),
+            },
             Asked::Points { epoch, since, columns } => {
                 Ok((BYTES, watch.points(epoch, since, &columns).map_err(failed)?))
             }

@@ -7,8 +7,10 @@ use crate::describe::{described, state};
 use crate::frame::frame;
 use crate::log::{Log, Stretch};
 use crate::orbit::{Place, solution};
-use foldline::diagram::{Kind, Point};
+use foldline::diagram::{Branch, Diagram, Kind, Point};
+use foldline::explore::System;
 use foldline::special::quantity::Quantity;
+use foldline::verify::{Verified, verify};
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
 use foldline_store::study_file::{Study, parse_study_of_run};
@@ -159,7 +161,7 @@ impl Watch {
     }
 
     /// Folder of the run.
-    fn folder(&self) -> PathBuf {
+    pub(crate) fn folder(&self) -> PathBuf {
         self.growing().folder.clone()
     }
 
@@ -176,6 +178,8 @@ impl Watch {
     /// Notes whether the page can go on with a longer study, or why it cannot.
     pub fn editable(&self, can: Result<(), String>) {
         *self.0.fixed.lock().unwrap_or_else(PoisonError::into_inner) = can.err();
+        // The state of a finished run, which was read before, says so too.
+        self.growing().stamp = None;
     }
 
     /// Reason why the page cannot go on with a longer study, if there is one.
@@ -360,6 +364,39 @@ impl Watch {
                 Ok(Some((span.name, own.point, Some((own.kind, number)))))
             }
         }
+    }
+
+    /// Recomputes one point by an independent method; `None` if there is no such point.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn verified(&self, branch: i64, place: Place) -> Result<Option<Verified>, RunFileError> {
+        let (study, _) = self.about();
+        let reading = Reading::open(&self.folder())?;
+        let Some(span) = reading.spans()?.into_iter().find(|span| span.number == branch) else { return Ok(None) };
+        let recorded = reading.recorded(Part::Special)?.diagram;
+        let Some(own) = recorded.branch(&span.name) else { return Ok(None) };
+        let mut alone = Branch { points: Vec::new(), special: Vec::new(), ..own.clone() };
+        match place {
+            Place::Position(position) => match reading.point(branch, position)? {
+                Some(point) => alone.insert(point),
+                None => return Ok(None),
+            },
+            Place::Special(index) => match reading.special_point(branch, index)? {
+                Some(special) => {
+                    // The point before it carries the parameters that do not vary; it is not recomputed itself.
+                    let Some(before) = reading.point(branch, special.point.position)? else { return Ok(None) };
+                    alone.insert(before);
+                    alone.insert_special(special);
+                }
+                None => return Ok(None),
+            },
+        }
+        drop(reading);
+        let sample = matches!(place, Place::Special(_)).then_some(0);
+        let diagram = Diagram { branches: vec![alone], ..Diagram::default() };
+        let system = System::of_plan(&study.model, &study.plan);
+        Ok(Some(verify(&system, &diagram, study.plan.tolerance, sample, &|_| true)))
     }
 
     fn growing(&self) -> MutexGuard<'_, Growing> {

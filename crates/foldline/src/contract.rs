@@ -405,6 +405,11 @@ pub trait ZeroProblem {
         f64::NAN
     }
 
+    /// Rounding error of the eigenvalue closest to 0 at a solution `u` with this tangent; 0 where none is computed.
+    fn blur(&mut self, _u: &[f64], _tangent: &[f64]) -> f64 {
+        0.0
+    }
+
     /// True if f or its derivatives jump somewhere, which no mesh resolves.
     fn is_switched(&self) -> bool {
         false

@@ -77,7 +77,7 @@ impl Page {
     /// Output of a command: its table and the list of incomplete parts, or the reason for a refusal.
     fn answer(&self, command: &str) -> Vec<String> {
         let run = Command::new(env!("CARGO_BIN_EXE_foldline"))
-            .args(command.split(' '))
+            .args(arguments(command))
             .current_dir(&self.place)
             .output()
             .unwrap();
@@ -100,6 +100,12 @@ impl Page {
         let targets = shown.filter_map(|line| line.split_once("](")?.1.strip_suffix(')'));
         targets.filter_map(|target| target.rsplit('/').next()).filter(|name| name.ends_with(".svg")).collect()
     }
+}
+
+/// Arguments of a command; what is between double quotes is one.
+fn arguments(command: &str) -> Vec<&str> {
+    let parts = command.split('"').enumerate();
+    parts.flat_map(|(k, part)| if k % 2 == 1 { vec![part] } else { part.split_whitespace().collect() }).collect()
 }
 
 /// Number in a word, and its number of decimals; no number of decimals with an exponent.

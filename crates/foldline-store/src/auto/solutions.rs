@@ -2,7 +2,7 @@
 
 use super::reader::Reader;
 use crate::diagnostic::Diagnostic;
-use crate::toml_walk::{read_text, unreadable};
+use crate::text_file::{read_text, unreadable};
 use std::path::Path;
 
 /// Solution in a file `s.NAME`.

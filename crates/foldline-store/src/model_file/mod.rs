@@ -15,7 +15,8 @@ mod totals;
 mod units;
 
 use crate::diagnostic::Diagnostic;
-use crate::toml_walk::{Value, Walk, diagnose, read_text, unreadable};
+use crate::text_file::{read_text, unreadable};
+use crate::toml_walk::{Value, Walk, diagnose};
 use foldline::model::{
     Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Parameter, Smoothing, unsupported,
 };

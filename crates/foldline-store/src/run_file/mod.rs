@@ -109,10 +109,20 @@ impl fmt::Display for RunFileError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             RunFileError::Missing(path) => {
+                let folder = path.parent().unwrap_or(path);
+                if folder.is_file() {
+                    let stem = folder.file_stem().unwrap_or_default().to_string_lossy();
+                    return write!(
+                        f,
+                        "{} is a file, not the folder of a run\n  help: a run of this study lies in runs/{stem}, unless `--out` \
+                         named another folder; `foldline run` and `foldline explore` write such folders",
+                        folder.display()
+                    );
+                }
                 write!(
                     f,
                     "there is no run file {}\n  help: give the folder of a run, as written by `foldline run` \
-                           or `foldline explore`",
+                           or `foldline explore`, such as runs/study",
                     path.display()
                 )
             }

@@ -237,6 +237,13 @@ pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 
         walk.report(value.span(), "the range is empty", "two different numbers, the smaller first");
         return None;
     }
+    // The step is a distance, the root of a sum of squares.
+    if !((high - low) * (high - low)).is_finite() {
+        let message =
+            format!("the range from {} to {} is too wide: its square is not a finite number", Shown(low), Shown(high));
+        walk.report(value.span(), message, "give the values between which the parameter can lie");
+        return None;
+    }
     Some([low, high])
 }
 
@@ -339,10 +346,33 @@ pub(super) fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &
     found
 }
 
+/// Kind of special point that other programs and texts call by this name.
+pub(super) fn other_name(name: &str) -> Option<&'static str> {
+    let plain = name.to_lowercase().replace(['_', ' '], "-");
+    let kind = match plain.as_str() {
+        "lp" | "sn" | "lpc" | "saddle-node" | "limit-point" | "turning-point" | "folds" | "tangent" => Kind::Fold,
+        "h" | "hb" | "ah" | "andronov-hopf" | "poincare-andronov-hopf" => Kind::Hopf,
+        "pd" | "flip" | "period-doublings" => Kind::PeriodDoubling,
+        "ns" | "tr" | "neimark-sacker" | "naimark-sacker" | "secondary-hopf" | "torus-bifurcation" => Kind::Torus,
+        "bp" | "pitchfork" | "transcritical" | "symmetry-breaking" | "branch-points" => Kind::BranchPoint,
+        _ => return None,
+    };
+    Some(kind.name())
+}
+
+/// Reads the kinds of special points at which branches are switched, each with its depth.
 pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
     let mut switching = Switching::default();
-    let Some(table) = walk.table(value, "`switch`") else { return switching };
     let names = SWITCHABLE.map(Kind::name);
+    if value.get_ref().as_table().is_none() {
+        let of = value.get_ref().as_array().and_then(|list| list.first()).map_or(value, |first| first);
+        let kind = of.get_ref().as_str().map(|name| other_name(name).unwrap_or(name));
+        let kind = kind.filter(|name| names.contains(name)).unwrap_or("hopf");
+        let hint = format!("write `switch = {{ {kind} = 1 }}`: the number of switches in a row that may follow");
+        walk.report(value.span(), "`switch` is not a table of kinds of special points", hint);
+        return switching;
+    }
+    let Some(table) = walk.table(value, "`switch`") else { return switching };
     for (key, value) in table.iter() {
         let name: &str = key.get_ref();
         match Kind::from_name(name).filter(|kind| SWITCHABLE.contains(kind)) {
@@ -366,7 +396,9 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                     }
                     (None, None) => (
                         format!("\"{name}\" is not a kind of special point at which branches can be switched"),
-                        suggest(name, &names),
+                        other_name(name)
+                            .filter(|own| names.contains(own))
+                            .map_or_else(|| suggest(name, &names), |own| format!("write `{own}`")),
                     ),
                 };
                 walk.report(key.span(), message, hint);

@@ -1,6 +1,6 @@
 //! `[[curve]]`: special points continued in two parameters.
 
-use super::branches::{bounds, free, marks, range, switch_step};
+use super::branches::{bounds, free, marks, other_name, range, switch_step};
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
 use super::seeds::state;
 use super::unknown_parameter;
@@ -299,7 +299,11 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
             Some(_) => format!("a point of the kind {name} cannot be continued in two parameters"),
             None => format!("\"{name}\" is not a kind of special point that can be continued"),
         };
-        walk.report(value.span(), message, suggest(&name, &HELD.map(Kind::name)));
+        let hint = match other_name(&name) {
+            Some(own) => format!("write \"{own}\""),
+            None => suggest(&name, &HELD.map(Kind::name)),
+        };
+        walk.report(value.span(), message, hint);
         return None;
     };
     let wrong = match (kind, family) {

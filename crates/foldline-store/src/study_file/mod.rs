@@ -2,7 +2,7 @@
 //!
 //! **Idea.** A study specifies in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`),
 //! branches (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`), whole diagrams
-//! (`[[explore]]`), simulations (`[[survey]]`, `[[sweep]]`) and maps over parameters (`[[map]]`). The whole text is read before it is rejected, so that
+//! (`[[explore]]`), simulations (`[[survey]]`, `[[sweep]]`), maps over parameters (`[[map]]`) and pictures (`[[figure]]`). The whole text is read before it is rejected, so that
 //! all mistakes are reported at once, each with position, cause and cure. The format is described in
 //! docs/book/study-files.md.
 
@@ -11,6 +11,7 @@ mod branches;
 mod curves;
 mod designs;
 mod explorations;
+mod figures;
 mod grown;
 mod holds;
 mod homotopies;
@@ -23,6 +24,7 @@ mod seeds;
 mod sharpened;
 
 pub use append::{Action, Appended, Place, Refusal, append};
+pub use figures::{FigurePlan, PanelPlan, Show, THEMES};
 pub use grown::{Added, added};
 pub use sharpened::Unsharpened;
 
@@ -31,7 +33,8 @@ use crate::finite::{check_explorations, check_seeds};
 use crate::model_file::items::spread;
 use crate::model_file::{parse_model, parse_model_of_run, read_model};
 use crate::nearest::suggest;
-use crate::toml_walk::{Value, Walk, read_text, unreadable};
+use crate::text_file::{beside, read_text, unreadable};
+use crate::toml_walk::{Value, Walk};
 use foldline::attractors::Limits;
 use foldline::contract::VectorField;
 use foldline::explore::Plan;
@@ -64,6 +67,8 @@ pub struct Study {
     pub spreads: Vec<(usize, Spread)>,
     /// True if plots show the uncertainty of special points.
     pub uncertainty: bool,
+    /// Figures of the run.
+    pub figures: Vec<FigurePlan>,
 }
 
 /// Points of cycles whose profiles stay in the run file when the run is complete. Special points and the ends of
@@ -79,7 +84,7 @@ pub enum Store {
     Every(u64),
 }
 
-const ROOT_KEYS: [&str; 22] = [
+const ROOT_KEYS: [&str; 23] = [
     "model",
     "title",
     "description",
@@ -102,6 +107,7 @@ const ROOT_KEYS: [&str; 22] = [
     "sweep",
     "design",
     "map",
+    "figure",
 ];
 
 /// Reads a study file and the model that it names. On failure, returns every mistake found.
@@ -122,7 +128,7 @@ pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Ve
             walk.report(
                 value.span(),
                 format!("the model file {} cannot be read: {error}", model_path.display()),
-                "give the path of a model file, relative to the folder of the study",
+                format!("give the path of a model file, relative to the folder of the study{}", beside(&model_path)),
             );
             return None;
         }
@@ -274,6 +280,7 @@ fn parse(
     let designs = designs::read(&mut walk, &root, &ground, &explorations, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(designs.iter().map(|own| own.name.as_str())).collect();
     let maps = maps::read(&mut walk, &root, &ground, &explorations, &defaults, &taken);
+    let figures = figures::read(&mut walk, &root, &model);
     if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
         check_totals(&mut walk, &root, &model);
     }
@@ -313,6 +320,7 @@ fn parse(
         store,
         spreads,
         uncertainty,
+        figures,
     })
 }
 
@@ -538,7 +546,11 @@ fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &m
 
 fn unknown_parameter(walk: &mut Walk, span: std::ops::Range<usize>, name: &str, model: &Model) {
     let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
-    walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known));
+    let hint = match model.state_index(name) {
+        Some(_) => format!("`{name}` is a state; the parameters are: {}", known.join(", ")),
+        None => suggest(name, &known),
+    };
+    walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), hint);
 }
 
 /// Reads the name of an item, which is required and must be unique.

@@ -269,12 +269,29 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
             let hint = "\"equilibrium\", \"cycle\", \"torus\", or a ratio of whole numbers such as \"2:1\"";
             let (message, hint) = match unsupported(&text) {
                 Some(kind) => (format!("the attractor \"{text}\": {}", kind.message), kind.instead),
-                None => (format!("\"{text}\" is not an attractor"), hint),
+                None => (
+                    format!("\"{text}\" is not an attractor"),
+                    named_otherwise(&text, model.iterated()).unwrap_or(hint),
+                ),
             };
             walk.report(value.span(), message, hint);
             None
         }
     }
+}
+
+/// Hint for an attractor under another name.
+fn named_otherwise(text: &str, iterated: bool) -> Option<&'static str> {
+    let plain = text.to_lowercase().replace(['-', '_'], " ");
+    Some(match plain.as_str() {
+        "fixed point" if iterated => "write \"fixed-point\"",
+        "fixed point" | "steady state" | "steady" | "stationary" | "rest" | "ep" | "equilibria" => {
+            "write \"equilibrium\""
+        }
+        "limit cycle" | "periodic" | "periodic orbit" | "periodic solution" | "oscillation" | "po" | "lc"
+        | "cycles" => "write \"cycle\"",
+        _ => return None,
+    })
 }
 
 /// Reads a number for each state, or `"zero"` for a state of zeros. The name of a repeated state stands for all its
@@ -283,8 +300,15 @@ pub(super) fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec
     if value.get_ref().as_str() == Some("zero") {
         return Some(vec![0.0; model.states.len()]);
     }
-    let table = walk.table(value, "`state`")?;
     let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
+    if value.get_ref().as_array().is_some() {
+        let values: Vec<String> = known.iter().take(3).map(|name| format!("{name} = …")).collect();
+        let more = if known.len() > 3 { ", …" } else { "" };
+        let hint = format!("name the states: `state = {{ {}{more} }}`", values.join(", "));
+        walk.report(value.span(), "`state` is a list of numbers", hint);
+        return None;
+    }
+    let table = walk.table(value, "`state`")?;
     let places: HashMap<&str, usize> = known.iter().enumerate().map(|(i, name)| (*name, i)).collect();
     let mut values: Vec<Option<f64>> = vec![None; known.len()];
     let before = walk.found.len();

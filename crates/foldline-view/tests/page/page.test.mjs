@@ -185,9 +185,86 @@ test("saved pictures and numbers are those of the diagram", limit, async (t) => 
   assert.equal(await picture.locator("parsererror").count(), 0);
   assert.ok((await picture.locator("path").count()) > 30);
   assert.deepEqual([...(await saved("PNG")).subarray(1, 4)], [...Buffer.from("PNG")]);
+  const pdf = String(await saved("PDF"));
+  assert.ok(pdf.startsWith("%PDF-1.4\n") && pdf.endsWith("%%EOF\n"));
+  // Every entry of the table of objects points to its object.
+  const table_at = Number(pdf.match(/startxref\n(\d+)\n/)[1]);
+  assert.equal(pdf.slice(table_at, table_at + 4), "xref");
+  const entries = [...pdf.slice(table_at).matchAll(/(\d{10}) 00000 n/g)].map((own) => Number(own[1]));
+  entries.forEach((at, k) => assert.ok(pdf.slice(at).startsWith(`${k + 1} 0 obj\n`), `object ${k + 1}`));
+  const stream = pdf.match(/\/Length (\d+) >>\nstream\n/);
+  assert.equal(pdf.slice(stream.index + stream[0].length + Number(stream[1])).slice(0, 10), "\nendstream");
+  // The axis is Ω, in the font Symbol; the other one is in Helvetica.
+  assert.match(pdf, /\/S 12 Tf \(W\) Tj/);
+  assert.match(pdf, /\/H 12 Tf \(max r\) Tj/);
   const lines = String(await saved("CSV")).trim().split("\n");
   const branches = table(finishedRun(), "--branches").filter((row) => row.held === null || row.held === undefined);
   assert.equal(lines.length - 1, branches.reduce((sum, row) => sum + row.points + row.special, 0));
+});
+
+test("the page saves itself with its view, and opens from the file", limit, async (t) => {
+  const { page, context } = await finishedPage(t);
+  await page.selectOption('[aria-label="y axis"]', { label: "max u" });
+  await page.locator("#special-list tr.pick").nth(1).click();
+  await page.waitForFunction(() => location.hash.includes("special=") && location.hash.includes("y=u_max"));
+  const [file] = await Promise.all([page.waitForEvent("download"), page.click('#saving button:has-text("HTML")')]);
+  assert.equal(file.suggestedFilename(), "rotor.html");
+  const saved = join(folder, "itself.html");
+  await file.saveAs(saved);
+  const other = await context.browser().newContext({ offline: true });
+  const copy = await other.newPage();
+  await copy.goto(pathToFileURL(saved).href);
+  await drawn(copy);
+  const seen = (own) => own.evaluate(() => {
+    const { app } = window.foldline;
+    return [app.run.about.quantities[app.diagram.qy].name, app.selected, document.querySelectorAll("#special-list tr.pick").length];
+  });
+  assert.deepEqual(await seen(copy), await seen(page));
+  // It cannot save itself again, and has nothing to compute with.
+  assert.equal(await copy.locator('#saving button:has-text("HTML")').count(), 0);
+  assert.ok(!(await copy.textContent("#title")).includes("/"));
+});
+
+test("the contact sequence of a grazing cycle has one contact more after it", limit, async (t) => {
+  const { page, errors } = await finishedPage(t);
+  const row = table(finishedRun()).find((one) => one.branch === "SL" && one.kind === "grazing" && /^contacts 2 → 1/.test(one.normal_form));
+  const at = await pointAt(page, "grazing", row.Omega);
+  await page.mouse.click(at[0], at[1]);
+  await page.waitForFunction(() => window.foldline.app.orbit.solution?.switches.length === 1);
+  await page.click('#orbit-controls button:has-text("Contact")');
+  const touches = () => page.evaluate(() => {
+    const { solution } = window.foldline.app.orbit;
+    const { values } = solution.switches[0];
+    let count = 0;
+    for (let k = 1; k < values.length; k += 1) count += values[k - 1] > 0 !== values[k] > 0 ? 1 : 0;
+    return count / 2;
+  });
+  const counts = [];
+  for (const steps of [["ArrowLeft"], ["ArrowRight", "ArrowRight"]]) {
+    for (const step of steps) await page.keyboard.press(step);
+    await page.waitForFunction(() => {
+      const { selected, orbit } = window.foldline.app;
+      return selected.special < 0 && orbit.solution?.header.position === selected.position;
+    });
+    counts.push(await touches());
+  }
+  assert.deepEqual([...counts].sort(), [1, 2]);
+  assert.deepEqual(errors, []);
+});
+
+test("a point is verified by an independent method", limit, async (t) => {
+  const { page, errors } = await finishedPage(t);
+  const row = table(finishedRun()).find((one) => one.branch === "SL" && one.kind === "fold" && one.Omega > 10);
+  const at = await pointAt(page, "fold", row.Omega);
+  await page.mouse.click(at[0], at[1]);
+  await page.waitForFunction(() => document.getElementById("actions").hidden === false);
+  // The study of a run that is opened by its folder can be extended too.
+  await page.locator('#actions button:text-is("Continue")').waitFor();
+  await page.click('#actions button:text-is("Verify")');
+  await page.locator("#log-text table").waitFor();
+  await page.waitForFunction(() => document.querySelector("#log-text p")?.textContent.includes("within the stated error"));
+  assert.ok((await page.locator("#log-text tbody tr").count()) > 0);
+  assert.deepEqual(errors, []);
 });
 
 test("narrow windows and dark colours show the same diagram", limit, async (t) => {

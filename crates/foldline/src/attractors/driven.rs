@@ -11,10 +11,11 @@
 //! ```
 
 use super::census::Pace;
+use super::measure::tolerance;
 use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
-use crate::diagram::{Cycle, Point, Response, Solution};
-use crate::simulation::bordered;
+use crate::diagram::{Cycle, Motion, Point, Response, Solution};
+use crate::simulation::{Integrator, bordered};
 use std::f64::consts::TAU;
 
 /// Largest distance of a period from a whole number of forcing periods for a motion locked to the forcing.
@@ -236,14 +237,19 @@ pub(super) fn simulate(
 ) -> Vec<Response> {
     let (driven, scales) = (Driven(trial.field), with_unit_scales(trial.scales));
     let own = Trial { field: &driven, scales: &scales, whirl: trial.whirl, jobs: trial.jobs, limits: trial.limits };
-    let plain = |found: &[Response]| -> Vec<Response> { found.iter().map(|r| without(r, trial.field)).collect() };
+    let plain = |found: &[Response]| -> Vec<Response> { found.iter().map(|r| without(r, &own)).collect() };
     let found = run(&own, &|found| report(&plain(found)));
     plain(&found)
 }
 
-fn without(response: &Response, field: &dyn VectorField) -> Response {
-    let (n, unit) = (field.dim(), field.time_unit(&response.parameters));
+fn without(response: &Response, driven: &Trial) -> Response {
+    let (n, unit) = (driven.field.dim() - 2, driven.field.time_unit(&response.parameters));
     let mut plain = response.clone();
+    if response.motion != Motion::Escaped
+        && let Some(state) = at_start_of_period(response, driven)
+    {
+        plain.state = state;
+    }
     plain.state.truncate(n);
     without_ranges_of_circle(&mut plain.ranges, n);
     // A motion that repeats with the forcing does so after a whole number of forcing periods.
@@ -251,6 +257,17 @@ fn without(response: &Response, field: &dyn VectorField) -> Response {
     plain.period = response.period.map(|period| whole(period) * unit);
     plain.settled_after *= unit;
     plain
+}
+
+/// State of a motion at the start of the next forcing period, without which it would not determine the motion; `None` if it
+/// cannot be integrated so far.
+fn at_start_of_period(response: &Response, driven: &Trial) -> Option<Vec<f64>> {
+    let n = driven.field.dim() - 2;
+    let [c, s] = *response.state.get(n..)? else { return None };
+    let left = 1.0 - (s.atan2(c) / TAU).rem_euclid(1.0);
+    // The field is its own clock: times are in forcing periods.
+    let integrator = Integrator::new(driven.field, &response.parameters, tolerance(driven));
+    integrator.state_after(&response.state, [0.0, left])
 }
 
 /// Removes the two states of the circle from a cycle, which then starts at the beginning of a forcing period.

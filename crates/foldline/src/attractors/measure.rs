@@ -87,7 +87,8 @@ fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mu
     None
 }
 
-fn tolerance(trial: &Trial) -> Tolerance {
+/// Tolerance of trajectories along a motion that has settled.
+pub(super) fn tolerance(trial: &Trial) -> Tolerance {
     Tolerance { relative: INTEGRATION, absolute: trial.scales.iter().map(|s| INTEGRATION * s).collect() }
 }
 

@@ -297,8 +297,35 @@ impl Follow<'_> {
             return Ok(done);
         }
         let tried = self.attempt(left, trail, step, rigid, cost)?;
+        let tried = self.beyond_rounding(left, trail, (step, rigid), tried, cost);
         let found = self.examined_between(left, &tried.right, trail, step, cost)?;
         Ok((tried, found))
+    }
+
+    /// A longer step in place of `tried` if that ends at an equilibrium whose number of unstable eigenvalues rounding decides,
+    /// as beside a branch point, and the longer one does not.
+    fn beyond_rounding(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        (step, rigid): (f64, bool),
+        tried: Step,
+        cost: &mut Cost,
+    ) -> Step {
+        let equilibria = left.point.solution.period().is_none();
+        let counts = self.settings.stability && equilibria && tried.end.is_none();
+        // Along a family of equilibria rounding decides everywhere.
+        if !counts || !self.is_undecided(&tried.right) || self.is_undecided(left) {
+            return tried;
+        }
+        for longer in [2.0, 4.0, 8.0, 16.0] {
+            match self.attempt(left, trail, longer * step, rigid, cost) {
+                Ok(beyond) if !self.is_undecided(&beyond.right) => return beyond,
+                Ok(_) => {}
+                Err(_) => break,
+            }
+        }
+        tried
     }
 
     /// A step on a moving mesh within which there is no special point and stability does not change.

@@ -275,25 +275,23 @@ impl Follow<'_> {
         // not be located, the meshes of the two ends disagree about the position; closer together they agree.
         let misplaced = !self.settings.stability && lost && jumps.is_empty() && change > 0;
         let touched = history.filter(|_| depth < 3).and_then(|h| {
-            let doubled = || may_double(h, left, right, stretch.length).then_some(0.5 * stretch.length);
+            let doubled =
+                || (jumps.is_empty() && may_double(h, left, right, stretch.length)).then_some(0.5 * stretch.length);
             self.touched(h, &at_left, &at_right, stretch.length).or_else(doubled)
         });
         let suspicious = touched.is_some() || depth < 3 && !standing && stretch.may_turn_twice();
         // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
         let mut seen = cut_there;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
-        if depth == 0 && jumps.is_empty() && unknown && seen.is_none() {
-            seen = self.seen_between(&stretch, [&at_left, &at_right], history.is_none(), cost);
+        if depth == 0 && unknown && seen.is_none() {
+            // What is located may lie between two zeros of another monitor.
+            let ends = [&at_left[..], &at_right[..]];
+            seen = self.seen_between(&stretch, ends, (history.is_none(), jumps.is_empty()), cost);
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
             && work(cost.factorisations, &left.mesh) < ALLOWANCE
-            && (jumps.len() > 1
-                || !explained
-                || misplaced
-                || misfit.is_some()
-                || cut_there.is_some()
-                || (suspicious && jumps.is_empty()))
+            && (jumps.len() > 1 || !explained || misplaced || misfit.is_some() || cut_there.is_some() || suspicious)
             && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {
             let cut = match &located[..] {
@@ -309,7 +307,7 @@ impl Follow<'_> {
             for place in places.into_iter().filter(|_| apart) {
                 let Some(found) = self.cut(left, &stretch, place, cost) else { continue };
                 // At the special point itself rounding decides on which side the eigenvalues are.
-                let undecided = on_the_border(&found) && !on_the_border(left) && !on_the_border(right);
+                let undecided = self.is_undecided(&found) && !self.is_undecided(left) && !self.is_undecided(right);
                 if middle.is_none() || !undecided {
                     middle = Some((place, found));
                 }
@@ -638,29 +636,31 @@ impl Follow<'_> {
         })
     }
 
-    /// Distance at which some monitor has a different sign than at the left end, if one is found. `first` is true if
-    /// nothing is known of the preceding step: equilibria, which are cheap, are then sampled more densely towards both
-    /// ends. For cycles the midpoint shows the rates of change of the monitors, which suffices if none may have touched
-    /// zero.
+    /// Distance at which some monitor has a different sign than at the left end, if one is found; unless `all`, only of
+    /// monitors with the same sign at both ends. `first` is true if nothing is known of the preceding step: equilibria,
+    /// which are cheap, are then sampled more densely towards both ends. For cycles the midpoint shows the rates of change
+    /// of the monitors, which suffices if none may have touched zero.
     fn seen_between(
         &mut self,
         stretch: &Stretch,
         [at_left, at_right]: [&[f64]; 2],
-        first: bool,
+        (first, all): (bool, bool),
         cost: &mut Cost,
     ) -> Option<f64> {
         const PLACES: [f64; 15] =
             [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875, 0.0625, 0.1875, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
         let cycles = !stretch.left.mesh.is_empty();
         let count = if first && !cycles { PLACES.len() } else { 3 };
-        let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
+        let differ = |a: f64, b: f64| (a > 0.0) != (b > 0.0);
+        let returns: Vec<bool> = at_left.iter().zip(at_right).map(|(a, b)| all || !differ(*a, *b)).collect();
+        let differs = |here: &[f64]| (0..here.len()).any(|k| returns[k] && differ(here[k], at_left[k]));
         let sight = self.monitors.iter().map(|monitor| monitor.reads()).max().unwrap_or(Sight::Tangent);
         let mut known = vec![(0.0, at_left.to_vec()), (1.0, at_right.to_vec())];
         for (k, share) in PLACES[..count].iter().enumerate() {
             let s = share * stretch.length;
             let Ok(found) = stretch.seen_at(sight, self.problem, self.settings, s, cost) else { continue };
             let here = self.monitored(&found);
-            if here.iter().zip(at_left).any(differs) {
+            if differs(&here) {
                 return Some(s);
             }
             if k == 0 && first && cycles {
@@ -691,7 +691,7 @@ impl Follow<'_> {
         let places: Vec<f64> = known.windows(3).filter_map(suspected).collect();
         places.into_iter().map(|share| share * stretch.length).find(|s| {
             let found = stretch.seen_at(sight, self.problem, self.settings, *s, cost);
-            found.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
+            found.is_ok_and(|found| differs(&self.monitored(&found)))
         })
     }
 
@@ -710,6 +710,22 @@ impl Follow<'_> {
             clear.then(|| real().filter(|z| z.re > centre).count())
         };
         beyond(left).zip(beyond(right)).is_some_and(|(left, right)| left != right)
+    }
+
+    /// True if rounding decides whether some eigenvalue or multiplier is stable. Beside a point where branches cross, rounding
+    /// of f displaces an equilibrium, and thereby its eigenvalue, more than elsewhere.
+    pub(super) fn is_undecided(&mut self, station: &Station) -> bool {
+        /// Distance from the border, relative to the largest eigenvalue or multiplier.
+        const ROUNDING: f64 = 1e-13;
+        /// Distance from 0 of an eigenvalue, relative to the largest, beyond which no displacement matters: an equilibrium is
+        /// displaced by at most the square root of the accuracy of a number where its matrix can still be solved with.
+        const NEAR: f64 = 1e-7;
+        let spectrum = station.point.free_spectrum();
+        let sizes = spectrum.iter().map(|z| z.norm());
+        let (least, largest) = sizes.fold((f64::INFINITY, f64::MIN_POSITIVE), |(a, b), z| (a.min(z), b.max(z)));
+        let off = |z: &Complex64| if is_cycle(station) { z.norm() - 1.0 } else { z.re };
+        spectrum.iter().any(|z| off(z).abs() <= ROUNDING * largest)
+            || !is_cycle(station) && least < NEAR * largest && least <= self.problem.blur(&station.u, &station.tangent)
     }
 
     /// Computes a full station at distance s of the interval.
@@ -789,16 +805,6 @@ fn passes_through(kind: Kind, around: &Around) -> bool {
         Kind::Torus => around.vanishing(1.0) > 1,
         _ => false,
     }
-}
-
-/// True if rounding decides whether some eigenvalue or multiplier is stable.
-fn on_the_border(station: &Station) -> bool {
-    /// Distance from the border, relative to the largest eigenvalue.
-    const ROUNDING: f64 = 1e-13;
-    let spectrum = station.point.free_spectrum();
-    let largest = spectrum.iter().map(|z| z.norm()).fold(f64::MIN_POSITIVE, f64::max);
-    let off = |z: &Complex64| if is_cycle(station) { z.norm() - 1.0 } else { z.re };
-    spectrum.iter().any(|z| off(z).abs() <= ROUNDING * largest)
 }
 
 /// True if the spectrum consists of multipliers.

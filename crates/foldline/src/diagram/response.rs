@@ -82,7 +82,7 @@ pub struct Response {
     /// In a sweep, true if the motion is not the continuation of the one at the previous value; `None` at the first
     /// value, if the two could not be compared, and in a survey.
     pub jumped: Option<bool>,
-    /// `[n]` last state, from which a sweep continues.
+    /// `[n]` last state; with forcing, at the start of a forcing period. (Up to version 0.2 of the program at any time.)
     pub state: Vec<f64>,
     /// Time until the motion had settled, without the time saved by extrapolation.
     pub settled_after: f64,

@@ -1,7 +1,7 @@
 //! Selection among the attractors found, and their description in messages.
 
 use super::System;
-use super::diagnosis::{Seen, of_no_start};
+use super::diagnosis::{Instead, Seen, of_no_start};
 use super::plan::{AttractorKey, SeedPlan};
 use crate::attractors::{Attractor, Census, whirl_sense};
 use crate::diagram::{Point, Solution, Symmetry};
@@ -148,10 +148,17 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         *key != AttractorKey::Equilibrium && census.attractors.iter().all(|a| a.point.solution.period().is_none());
     let (stuck, unsettled) = (census.stuck > 0, (none || rest_only) && census.unsettled > 0);
     let exit = census.exits.first().filter(|_| none);
+    let oscillates = |a: &Attractor| a.point.solution.period().is_some();
+    let instead = match key {
+        _ if none => None,
+        AttractorKey::Equilibrium => census.attractors.iter().all(oscillates).then_some(Instead::Oscillation),
+        AttractorKey::Cycle if !system.field.forced() => rest_only.then_some(Instead::Rest),
+        _ => None,
+    };
     let why = of_no_start(
         system,
         &seed.parameters,
-        Seen { state: None, stuck, all_escaped, exit, unsettled, repeats: false },
+        Seen { state: None, stuck, all_escaped, exit, unsettled, repeats: false, instead },
     );
     let unnamed = census.attractors.iter().any(|a| a.point.solution.period().is_some() && a.ratio.is_none());
     let single = match key {

@@ -31,6 +31,17 @@ pub(super) struct Seen<'a> {
     pub unsettled: bool,
     /// True if the trajectory from the given state repeats itself, and Newton's method does not confirm that motion.
     pub repeats: bool,
+    /// Attractors that samples reached instead of the one that is sought, if they explain its absence.
+    pub instead: Option<Instead>,
+}
+
+/// Attractors reached instead of the one that is sought.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Instead {
+    /// Only equilibria, where a cycle is sought.
+    Rest,
+    /// Only cycles, where an equilibrium is sought.
+    Oscillation,
 }
 
 /// Returns lines with a likely cause and a cure, to be appended to a message about what happened.
@@ -96,9 +107,18 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
                 limits(system, seen.state.is_some())
             )
         }
-        _ => {
-            "\nwhat to do: use more samples, change the parameters or the ranges of the states, or give a state".into()
-        }
+        _ => match seen.instead {
+            Some(Instead::Rest) => "\nlikely cause: at these parameter values trajectories come to rest\nwhat to do: write \
+                                    `attractor = \"equilibrium\"`; or give the seed `parameters` at which the model \
+                                    oscillates; or follow the equilibrium to a Hopf point, from which `switch = { hopf = 1 }` \
+                                    leads to cycles, stable or not"
+                .into(),
+            Some(Instead::Oscillation) => "\nlikely cause: the equilibrium is unstable at these parameter values\nwhat to do: give \
+                                           a `state` near it in place of the attractor: an equilibrium near a given state is found \
+                                           whether it is stable or not; or give the seed `parameters` at which it is stable"
+                .into(),
+            None => "\nwhat to do: use more samples, change the parameters or the ranges of the states, or give a state".into(),
+        },
     }
 }
 

@@ -68,6 +68,7 @@ pub mod plan;
 mod profile;
 mod pursuit;
 pub mod recognised;
+pub mod replay;
 mod repointed;
 mod resonances;
 mod responses;

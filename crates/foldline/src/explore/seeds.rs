@@ -570,7 +570,7 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
     let why = of_no_start(
         system,
         &seed.parameters,
-        Seen { state: Some(state), stuck, all_escaped, exit, unsettled, repeats },
+        Seen { state: Some(state), stuck, all_escaped, exit, unsettled, repeats, instead: None },
     );
     format!("the trajectory from the given state {what}{why}")
 }

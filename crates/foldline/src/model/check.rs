@@ -174,7 +174,7 @@ impl<'a> Check<'a> {
         self.functions();
         self.indices();
         if source.states.is_empty() {
-            self.report(Item::Model, Field::Name, "the model has no states", "declare at least one state");
+            self.report(Item::Model, Field::Name, "the model has no states", "declare at least one, such as `[states.x]` with `equation = \"mu - x\"`; `foldline new oscillator` writes an example");
         }
     }
 

@@ -15,6 +15,19 @@ pub(super) enum Token {
 /// Longer symbols first.
 const SYMBOLS: [&str; 16] = ["<=", ">=", "==", "!=", "+", "-", "*", "/", "^", "(", ")", "[", "]", ",", "<", ">"];
 
+/// Operators of other languages, and what to write instead.
+const FOREIGN: [(&str, &str); 9] = [
+    ("**", "write `^` for a power"),
+    (".^", "write `^` for a power; a name stands for one number, so operators need no dot"),
+    (".*", "write `*` for a product; a name stands for one number, so operators need no dot"),
+    ("./", "write `/` for a quotient; a name stands for one number, so operators need no dot"),
+    ("<>", "write `!=` for unequal"),
+    ("~=", "write `!=` for unequal"),
+    ("&&", "combine conditions with `*` for and, `max(a, b)` for or"),
+    ("||", "combine conditions with `*` for and, `max(a, b)` for or"),
+    ("//", "write `floor(a/b)` for a quotient without remainder"),
+];
+
 /// Splits `text` into tokens with their byte ranges.
 pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint> {
     let mut words: Vec<(Token, Range<usize>)> = Vec::new();
@@ -40,13 +53,22 @@ pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint>
             let length = if at_end { primed + 2 } else { primed };
             words.push((Token::Name(rest[..length].to_string()), at..at + length));
             at += length;
-        } else if rest.starts_with("**") {
-            return Err(Complaint::new(at..at + 2, "`**` is not an operator", "write `^` for a power"));
+        } else if let Some((_, hint)) = FOREIGN.iter().find(|(sign, _)| rest.starts_with(sign)) {
+            let sign: String = rest.chars().take(2).collect();
+            return Err(Complaint::new(at..at + sign.len(), format!("`{sign}` is not an operator"), *hint));
         } else if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| rest.starts_with(symbol)) {
             words.push((Token::Symbol(symbol), at..at + symbol.len()));
             at += symbol.len();
         } else {
-            return Err(stray(first, at));
+            return Err(match (first, words.last()) {
+                ('.', Some((Token::Name(of), span))) => part(of, &rest[1..], span.start),
+                ('=', Some((Token::Name(of), span))) if of.ends_with("''") => Complaint::new(
+                    span.start..at + 1,
+                    "an equation has only its right-hand side here",
+                    format!("give the acceleration as a state: `\"{of}\" = \"…\"` under [states]"),
+                ),
+                _ => stray(first, at),
+            });
         }
     }
     Ok(words)
@@ -81,18 +103,38 @@ fn glued(number: &str, next: char, rest: &str, span: Range<usize>) -> Complaint 
         return Complaint::new(span, "a number with two decimal points", "write one decimal point, as in 1.5");
     }
     let name: String = rest.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect();
-    Complaint::new(
-        span,
-        format!("the number `{number}` runs into `{name}`"),
-        format!("write a product with a star: `{number}*{name}`"),
-    )
+    let digits = name.strip_prefix('_').filter(|own| own.starts_with(|c: char| c.is_ascii_digit()));
+    let hint = match digits {
+        Some(digits) => format!("write numbers without `_`: `{number}{digits}`"),
+        None => format!("write a product with a star: `{number}*{name}`"),
+    };
+    Complaint::new(span, format!("the number `{number}` runs into `{name}`"), hint)
+}
+
+/// A name with a part, such as `np.sin` or `p.mu`; `rest` follows the dot.
+fn part(of: &str, rest: &str, start: usize) -> Complaint {
+    let name: String = rest.chars().take_while(|&c| c.is_alphanumeric() || c == '_').collect();
+    let end = start + of.len() + 1 + name.len();
+    let hint = match (name.is_empty(), rest[name.len()..].starts_with('(')) {
+        (true, _) => "remove the dot".to_string(),
+        (false, true) => format!("write the function alone: `{name}(…)`"),
+        (false, false) => format!("write the name alone: `{name}`"),
+    };
+    Complaint::new(start..end, format!("`{of}.{name}`: a name has no parts"), hint)
 }
 
 fn stray(found: char, at: usize) -> Complaint {
     let hint = match found {
         '=' => "compare with `==`; an equation has only its right-hand side here",
         '{' | '}' => "write round brackets ( ), or square ones for an index, as in `x[i+1]`",
-        '&' | '|' => "combine conditions with `*` for and, `max(a, b)` for or",
+        '&' => "combine conditions with `*` for and, `max(a, b)` for or",
+        '|' => "write `abs(x)` for an absolute value; conditions are combined with `max(a, b)` for or",
+        '?' | ':' => "write `if(condition, then, else)`",
+        '!' | '~' | '¬' => "the opposite of a condition `c` is `1 - (c)`",
+        '%' => "write `mod(a, b)` for a remainder",
+        ';' => "an equation is a single expression; remove the semicolon",
+        '\\' => "write the function by its name, as in `sin(x)`",
+        '÷' => "write `/` for a quotient",
         '\'' => "a rate is written `x'`, and `x'[i]` where x has an index",
         '@' => "under [boundary], a state `x` is written `x@0` at the beginning of the interval and `x@1` at its end",
         '×' | '·' => "write `*` for a product",

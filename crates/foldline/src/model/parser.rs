@@ -350,7 +350,40 @@ impl Parser<'_> {
                 "write a decimal point instead of a comma",
             ),
             Token::Number(_) | Token::Name(_) | Token::Symbol("(") if after_value => {
+                let before =
+                    |back: usize| self.at.checked_sub(back).and_then(|at| self.words.get(at)).map(|(token, _)| token);
+                let named = |token: Option<&Token>, of: &[&str]| matches!(token, Some(Token::Name(name)) if of.contains(&name.as_str()));
+                let here = Some(&token);
+                if named(here, &["if", "else", "then"]) || named(before(1), &["if", "else", "then"]) {
+                    return Complaint::new(
+                        span,
+                        "an operator is missing before this",
+                        "write `if(condition, then, else)`",
+                    );
+                }
+                if named(here, &["and", "or"]) {
+                    let hint = "combine conditions with `*` for and, `max(a, b)` for or";
+                    return Complaint::new(span, "this word is not an operator", hint);
+                }
+                if named(before(1), &["not"]) {
+                    return Complaint::new(
+                        span,
+                        "an operator is missing before this",
+                        "the opposite of a condition `c` is `1 - (c)`",
+                    );
+                }
                 let hint = match self.words.get(self.at.saturating_sub(1)) {
+                    // A power between the name and its argument, as in sin^2(x).
+                    Some((Token::Number(power), _))
+                        if token == Token::Symbol("(") && before(2) == Some(&Token::Symbol("^")) =>
+                    {
+                        match before(3) {
+                            Some(Token::Name(name)) if function(name).is_some() => {
+                                format!("write the power after the argument: `{name}(…)^{power}`")
+                            }
+                            _ => "write `*` for a product".to_string(),
+                        }
+                    }
                     Some((Token::Name(name), _)) if function(name).is_some() => {
                         format!("write `*` for a product, or brackets around an argument: `{name}(…)`")
                     }

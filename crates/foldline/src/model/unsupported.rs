@@ -55,8 +55,8 @@ const KINDS: [Kind; 15] = [
     (
         &["homoclinic", "heteroclinic", "connection", "connectingorbit", "homcont"],
         "connecting orbits are curves in two parameters, which belong to a study",
-        "write a [[curve]] with `hold = \"homoclinic\"` or `\"heteroclinic\"`, `of` a branch of cycles that ends at one or of \
-         equilibria; for orbits homoclinic to a saddle-node use AUTO-07p (HomCont) or MATCONT",
+        "write a [[curve]] with `hold = \"homoclinic\"`, `\"heteroclinic\"` or `\"saddle-node-homoclinic\"`, `of` a branch of cycles \
+         that ends at such an orbit; the first two also start `of` a branch of equilibria",
     ),
     (
         &["frequencie", "secondfrequency", "frequency2"],
@@ -76,7 +76,7 @@ const KINDS: [Kind; 15] = [
          pde2path",
     ),
     (
-        &["initial", "initialcondition", "initialvalue", "initialstate", "ic", "x0", "y0"],
+        &["initial", "initialcondition", "initialvalue", "initialstate", "init", "ic", "x0", "y0"],
         "initial conditions do not belong to this table",
         "give an initial state in the study, as in [[seed]] with `state = { x = 1, v = 0 }`, or a `range` of each \
          state in the model, from which initial states are sampled",

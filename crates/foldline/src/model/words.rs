@@ -3,7 +3,7 @@
 use super::check::{Check, MOST_ERRORS, TIME};
 use super::error::{Complaint, Field, Item};
 use super::family::{Kind, Layout};
-use super::nearest::suggest;
+use super::nearest::{nearest, suggest};
 use super::parser::{Expression, Term};
 use super::scope::Symbol;
 use super::source::Ends;
@@ -115,10 +115,19 @@ impl Check<'_> {
             None if counted => {
                 format!("define it as a constant: `{name} = 40` under [constants], and `count = \"{name}\"`")
             }
+            None if name == "e" => "write `exp(x)` for a power of e; e itself is `exp(1)`".into(),
+            None if matches!(name, "π" | "Pi" | "PI") => "write `pi`".into(),
+            None if name.ends_with(['²', '³']) => {
+                let base = name.trim_end_matches(['²', '³']);
+                format!("write `{base}^{}`", if name.ends_with('²') { 2 } else { 3 })
+            }
             None => {
                 let mut known: Vec<&str> = self.symbols.keys().copied().collect();
                 known.sort();
-                suggest(name, &known)
+                match nearest(name, known.iter().copied()) {
+                    Some(_) => suggest(name, &known),
+                    None => format!("declare it under [parameters] or [definitions]; {}", suggest(name, &known)),
+                }
             }
         };
         match self.source.outputs.iter().any(|output| output.name == name) {

@@ -199,6 +199,35 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         4.0 * f64::EPSILON.sqrt() * size
     }
 
+    /// Each equation is uncertain by the rounding of its terms, about |f_x| |x| + |f_λ| |λ| times the relative accuracy of a
+    /// number. The error moves the solution, farther the closer the matrix is to a singular one, and with it the eigenvalue.
+    fn blur(&mut self, u: &[f64], tangent: &[f64]) -> f64 {
+        let (n, k, first) = (self.n(), self.setting.freedom(), self.first());
+        if self.factorise(u, tangent).is_err() {
+            return f64::INFINITY;
+        }
+        let terms = |row: &[f64], x: &[f64]| row.iter().zip(x).map(|(a, b)| (a * b).abs()).sum::<f64>();
+        let rounded = (0..n).map(|i| terms(&self.fx[i * n..][..n], u) + terms(&self.fp[i * k..][..k], &u[first..]));
+        let rounded: Vec<f64> = rounded.map(|size| f64::EPSILON * size).collect();
+        let scales = self.setting.scales;
+        let nearest = |fx: &[f64]| {
+            eigenvalues(fx, n, scales).into_iter().min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default()
+        };
+        let here = nearest(&self.fx);
+        let (mut change, mut worst) = (vec![0.0; u.len()], 0.0f64);
+        // The errors are arbitrary; these have no symmetry to which a left null vector could be orthogonal.
+        for phase in [1.0, 2.5] {
+            let error = |i: usize| rounded.get(i).map_or(0.0, |size| size * (2.4 * i as f64 + phase).cos());
+            let mut rhs: Vec<f64> = (0..u.len()).map(error).collect();
+            self.solve(&rhs, &mut change);
+            axpy(1.0, u, &mut change);
+            std::mem::swap(&mut rhs, &mut change);
+            self.linearise(&rhs);
+            worst = worst.max((nearest(&self.fx) - here).norm());
+        }
+        worst
+    }
+
     fn margin(&self, at: &Point) -> f64 {
         let sizes = at.spectrum.iter().map(|z| z.norm());
         sizes.clone().fold(f64::INFINITY, f64::min) / sizes.fold(f64::MIN_POSITIVE, f64::max)

@@ -100,6 +100,17 @@ impl CodimensionTwo<'_> {
         self.local(reference, at)?.null_vectors_near(&before)
     }
 
+    /// True unless the coefficient of a bifurcation of cycles is zero within its error at one of these points, as all along a
+    /// curve on which it vanishes by the structure of the model: its sign there is one of rounding.
+    fn is_significant(&self, ends: [&Point; 2]) -> bool {
+        let setting = |at: &Point| {
+            let axes = Vec::new();
+            Setting { field: self.field, scales: self.scales, parameters: at.parameters.clone(), axes }
+        };
+        // Those of maps are positive where they vanish.
+        self.field.iterated() || ends.into_iter().all(|end| cycle_form::is_significant(self.held, setting(end), end))
+    }
+
     /// Critical part of the spectrum, then the rest.
     fn parts<'p>(&self, at: &'p Point) -> (&'p [Complex64], &'p [Complex64]) {
         let all = at.free_spectrum();
@@ -225,6 +236,9 @@ impl Monitor for CodimensionTwo<'_> {
         }
         if self.kind == Kind::Cusp && of_cycle {
             return fold::parameters_rest(ends, at);
+        }
+        if matches!(self.kind, Kind::GeneralisedPeriodDoubling | Kind::Chenciner) {
+            return self.is_significant(ends);
         }
         // In a conservative system the eigenvalue 0 is double all along the curve.
         let always_double = || ends.iter().all(|end| self.is_simple(end) == Some(false));

@@ -26,6 +26,7 @@ use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point, Solution};
+use crate::linalg::max_abs;
 use crate::linalg::system::System;
 use crate::problem::{Setting, mesh};
 
@@ -57,8 +58,26 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     (found.divisor.abs() > NOTHING).then_some(found.value)
 }
 
+/// True if a coefficient differs from zero by more than it changes when the critical eigenfunction does by the error of the
+/// profile. Where the nonlinear terms vanish by the structure of the model, all that remains of them is such an error.
+pub(super) fn is_significant(kind: Kind, setting: Setting, at: &Point) -> bool {
+    let Solution::Cycle(cycle) = &at.solution else { return false };
+    let Some(denser) = on_mesh(at, &mesh::denser(&cycle.mesh)) else { return false };
+    let error = at.trust.discretisation.max(f64::EPSILON.sqrt());
+    let [own, other] = [0.0, error].map(|shaken| shaken_value(kind, setting.clone(), &denser, shaken));
+    own.zip(other).is_some_and(|(own, other)| own.value.abs() > SAFE * (own.value - other.value).abs())
+}
+
+/// Factor of safety between the change of a coefficient under one change of the eigenfunction and under all of that size.
+const SAFE: f64 = 4.0;
+
 /// Computes the coefficient on the mesh of the point.
 pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> {
+    shaken_value(kind, setting, at, 0.0)
+}
+
+/// Computes the coefficient with a relative error of size `shaken`, without structure, in the critical eigenfunction.
+fn shaken_value(kind: Kind, setting: Setting, at: &Point, shaken: f64) -> Option<Value> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
@@ -75,6 +94,8 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
         _ => length,
     };
     v.iter_mut().for_each(|x| *x /= size);
+    let largest = max_abs(&v);
+    v.iter_mut().enumerate().for_each(|(i, x)| *x += shaken * largest * (2.4 * i as f64 + 1.0).cos());
     let (value, terms) = match kind {
         Kind::Fold => form.fold(&v, free_fold),
         Kind::PeriodDoubling => form.doubling(&v, spare)?,
