@@ -126,6 +126,10 @@ demos! {
     obv,
     ops,
     opt,
+    #[ignore = "takes seconds"]
+    p2c,
+    #[ignore = "takes seconds"]
+    pcl,
     pd1,
     pd2,
     #[ignore = "takes seconds"]

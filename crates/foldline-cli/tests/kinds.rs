@@ -106,17 +106,7 @@ impl Kind {
             std::fs::create_dir(folder.join(&out)).unwrap();
             let file: PathBuf = folder.join(&out).join("run.sqlite");
             std::fs::copy(folder.join("whole/run.sqlite"), &file).unwrap();
-            let cut = rusqlite::Connection::open(&file).unwrap();
-            cut.execute_batch(&format!(
-                "CREATE TEMP TABLE lost AS SELECT rowid AS r, branch, position FROM points ORDER BY rowid LIMIT -1 OFFSET {kept};
-                 DELETE FROM special_points WHERE EXISTS (SELECT 1 FROM lost WHERE lost.branch = special_points.branch
-                     AND lost.position = special_points.position + (special_points.position >= 0));
-                 DELETE FROM points WHERE rowid IN (SELECT r FROM lost);
-                 DELETE FROM ends WHERE branch IN (SELECT branch FROM lost);
-                 DELETE FROM branches WHERE branch NOT IN (SELECT branch FROM points);"
-            ))
-            .unwrap();
-            drop(cut);
+            crate::runs::cut_off(&file, kept);
             foldline(folder, &["run", "s.toml", "--out", &out, "--jobs", "1", "--resume"], &[0]);
             self.same(folder, &out);
         }

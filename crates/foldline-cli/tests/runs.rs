@@ -156,6 +156,28 @@ fn the_same_study_gives_the_same_table_for_any_number_of_threads() {
     assert_eq!(table("1"), table("3"));
 }
 
+/// Leaves of a finished run what a kill after `kept` accepted points leaves of it.
+pub fn cut_off(file: &Path, kept: i64) {
+    // Rows are stored in the order of acceptance. A special point lies between its position and the next; of these two points,
+    // the one further from the start was accepted after it.
+    let run = rusqlite::Connection::open(file).unwrap();
+    let held = "SELECT count(*) FROM sqlite_master WHERE name = 'held_quantities'";
+    let of_branches = match run.query_row(held, [], |row| row.get::<_, i64>(0)).unwrap() {
+        0 => "",
+        _ => "DELETE FROM held_quantities WHERE branch NOT IN (SELECT branch FROM points);",
+    };
+    run.execute_batch(&format!(
+        "CREATE TEMP TABLE lost AS SELECT rowid AS r, branch, position FROM points ORDER BY rowid LIMIT -1 OFFSET {kept};
+         DELETE FROM special_points WHERE EXISTS (SELECT 1 FROM lost WHERE lost.branch = special_points.branch
+             AND lost.position = special_points.position + (special_points.position >= 0));
+         DELETE FROM points WHERE rowid IN (SELECT r FROM lost);
+         DELETE FROM ends WHERE branch IN (SELECT branch FROM lost);
+         {of_branches}
+         DELETE FROM branches WHERE branch NOT IN (SELECT branch FROM points);"
+    ))
+    .unwrap();
+}
+
 #[test]
 fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
     let desk = desk("README.md");
@@ -172,20 +194,7 @@ fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
         std::fs::create_dir(desk.path().join(&out)).unwrap();
         let file = desk.path().join(&out).join("run.sqlite");
         std::fs::copy(desk.path().join("whole/run.sqlite"), &file).unwrap();
-        // Rows are stored in the order of acceptance, so cutting off the last ones has the effect of a kill. A special
-        // point lies between its position and the next; of these two points, the one further from the start was
-        // accepted after it.
-        let cut = rusqlite::Connection::open(&file).unwrap();
-        cut.execute_batch(&format!(
-            "CREATE TEMP TABLE lost AS SELECT rowid AS r, branch, position FROM points ORDER BY rowid LIMIT -1 OFFSET {kept};
-             DELETE FROM special_points WHERE EXISTS (SELECT 1 FROM lost WHERE lost.branch = special_points.branch
-                 AND lost.position = special_points.position + (special_points.position >= 0));
-             DELETE FROM points WHERE rowid IN (SELECT r FROM lost);
-             DELETE FROM ends WHERE branch IN (SELECT branch FROM lost);
-             DELETE FROM branches WHERE branch NOT IN (SELECT branch FROM points);"
-        ))
-        .unwrap();
-        drop(cut);
+        cut_off(&file, kept);
         let before = table(&out, "--points");
         printed(desk.path(), &["run", "study.toml", "--jobs", "1", "--out", &out, "--resume"], 0);
         let after = table(&out, "--points");
