@@ -62,7 +62,8 @@ fn foldline(folder: &Path, arguments: &[&str], codes: &[i32]) -> String {
 fn columns(csv: &str, names: [&str; 3]) -> Vec<[String; 3]> {
     let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let heads = lines.next().unwrap();
-    let at = names.map(|name| heads.iter().position(|head| *head == name).unwrap_or_else(|| panic!("{name}: {heads:?}")));
+    let at =
+        names.map(|name| heads.iter().position(|head| *head == name).unwrap_or_else(|| panic!("{name}: {heads:?}")));
     lines.map(|cells| at.map(|k| cells[k].to_string())).collect()
 }
 
@@ -72,7 +73,8 @@ impl Kind {
         let folder = tempfile::tempdir().unwrap();
         let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
         std::fs::copy(models.join(format!("{}.toml", self.model)), folder.path().join("m.toml")).unwrap();
-        std::fs::write(folder.path().join("s.toml"), format!("model = \"m.toml\"\ntolerance = 1e-7\n{}", self.study)).unwrap();
+        std::fs::write(folder.path().join("s.toml"), format!("model = \"m.toml\"\ntolerance = 1e-7\n{}", self.study))
+            .unwrap();
         foldline(folder.path(), &["run", "s.toml", "--out", "whole", "--jobs", "1"], &[0]);
         folder
     }
@@ -120,7 +122,10 @@ impl Kind {
     fn is_verified(&self) {
         let desk = self.desk();
         let said = foldline(desk.path(), &["verify", "whole"], &[0]);
-        assert!(said.contains("100.0 % within the stated error") || said.contains(" 0 outside the stated error"), "{said}");
+        assert!(
+            said.contains("100.0 % within the stated error") || said.contains(" 0 outside the stated error"),
+            "{said}"
+        );
     }
 
     /// Tables, CSV and NetCDF have the values of the parameter.

@@ -73,7 +73,8 @@ impl Mapping {
                 return Err(complaint(message, format!("give it, as in `--states 1={}`", known[0])));
             }
         };
-        let twice = states.iter().enumerate().any(|(i, number)| *number == 0 || *number > dim || states[..i].contains(number));
+        let twice =
+            states.iter().enumerate().any(|(i, number)| *number == 0 || *number > dim || states[..i].contains(number));
         if twice {
             let message = format!(
                 "`--states` does not match each of AUTO's states, 1 to {dim}, to a state of the \

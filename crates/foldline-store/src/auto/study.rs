@@ -182,7 +182,10 @@ fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, 
                 "the solution labelled {label} does not close: `{}` ends {gap:.1e} from where it begins",
                 own.name
             );
-            return Err(complaint(message, "a boundary-value problem needs a model with `[interval]` and `[boundary]`"));
+            return Err(complaint(
+                message,
+                "a boundary-value problem needs a model with `[interval]` and `[boundary]`",
+            ));
         }
     }
     let period = duration(solution)?;
@@ -218,7 +221,8 @@ fn over(solution: &Labelled, states: &[f64], duration: f64) -> Result<Cycle, Com
 fn arc(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) -> Result<(String, Solution), Complaint> {
     let n = model.dim();
     if !solution.lasts() || !matches!(solution.problem, None | Some(4 | 7)) {
-        let message = format!("the model is a boundary-value problem, but the solution labelled {} is not", solution.label);
+        let message =
+            format!("the model is a boundary-value problem, but the solution labelled {} is not", solution.label);
         return Err(complaint(message, "solutions of boundary-value problems have IPS = 4 or 7"));
     }
     let given = Cycle { forcing_periods: 1, ..over(solution, states, model.time_unit(values))? };
@@ -233,7 +237,12 @@ fn arc(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) -> Re
 
 /// State at the beginning of a forcing period on a cycle of a forced model. The phase of the oscillator that forces it in AUTO is
 /// unknown here; it is the one with which the cycle satisfies the equations best.
-fn response(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) -> Result<(String, Solution), Complaint> {
+fn response(
+    model: &Model,
+    solution: &Labelled,
+    states: &[f64],
+    values: &[f64],
+) -> Result<(String, Solution), Complaint> {
     /// Largest accepted deviation of the period from that of the forcing, relative.
     const ONE_PERIOD: f64 = 1e-3;
     /// Phases that are compared, and steps of the golden section from the best of them.
@@ -247,8 +256,9 @@ fn response(model: &Model, solution: &Labelled, states: &[f64], values: &[f64]) 
     }
     let (period, unit) = (duration(solution)?, model.time_unit(values));
     if (period / unit - 1.0).abs() > ONE_PERIOD {
-        let message =
-            format!("the cycle labelled {label} has the period {period}, but that of the forcing is {unit} at its parameters");
+        let message = format!(
+            "the cycle labelled {label} has the period {period}, but that of the forcing is {unit} at its parameters"
+        );
         return Err(complaint(
             message,
             "import a cycle of one forcing period, and switch to longer ones at its period doublings",
@@ -360,8 +370,12 @@ fn curve(model: &Model, one: &Chosen, name: &str, values: &[f64], free: usize) -
     let heteroclinic = arrival(model, one, &nodes);
     let hold = if heteroclinic.is_some() { "heteroclinic" } else { "homoclinic" };
     let to = heteroclinic.map_or_else(String::new, |to| {
-        let all: Vec<String> =
-            model.states.iter().zip(to).map(|(own, value)| format!("{} = {}", key(&own.name), decimal(value))).collect();
+        let all: Vec<String> = model
+            .states
+            .iter()
+            .zip(to)
+            .map(|(own, value)| format!("{} = {}", key(&own.name), decimal(value)))
+            .collect();
         format!("to = {{ {} }}\n", all.join(", "))
     });
     let (branch, first) = (quoted(&format!("equilibria from {name}")), quoted(&model.parameters[free].name));

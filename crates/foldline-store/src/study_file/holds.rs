@@ -188,7 +188,9 @@ fn along_interval(walk: &mut Walk, name: &str, span: std::ops::Range<usize>, mod
     walk.report(
         span,
         message,
-        format!("a value at a place such as `{x}@0.5`, `{x}_mean`, `{x}_rms`, `{x}_integral`, or a parameter of `solve`"),
+        format!(
+            "a value at a place such as `{x}@0.5`, `{x}_mean`, `{x}_rms`, `{x}_integral`, or a parameter of `solve`"
+        ),
     );
     None
 }

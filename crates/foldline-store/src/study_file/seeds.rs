@@ -14,7 +14,17 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 pub(super) const KEYS: [&str; 11] = [
-    "name", "description", "attractor", "periods", "state", "cycle", "profile", "torus", "parameters", "samples", "random",
+    "name",
+    "description",
+    "attractor",
+    "periods",
+    "state",
+    "cycle",
+    "profile",
+    "torus",
+    "parameters",
+    "samples",
+    "random",
 ];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;

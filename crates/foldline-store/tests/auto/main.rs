@@ -166,7 +166,12 @@ fn mismatches_with_the_model_are_reported() {
             "does not satisfy the model: the relative residual of the equation of `u2` is",
         ),
         (&three, &named, [&[], &[]], "has 3 states, but the solution has 2 states"),
-        (&forced, &named, [&[], &[]], "has the period 2.9999981419, but that of the forcing is 6.283185307179586 at its"),
+        (
+            &forced,
+            &named,
+            [&[], &[]],
+            "has the period 2.9999981419, but that of the forcing is 6.283185307179586 at its",
+        ),
     ];
     for (model, names, pairs, message) in cases {
         let found = imported(model, CYCLES, names, pairs).unwrap_err();

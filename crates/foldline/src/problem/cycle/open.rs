@@ -280,7 +280,8 @@ impl CycleProblem<'_> {
         let change = self.setting.spread(&y[size + 1..]);
         let own = Varied { field: self.setting.field, change, remaining: None };
         let remaining = self.remaining(u, &y, &own);
-        let field = Varied { remaining: Some(Remaining { mesh: &self.mesh, scheme: &self.scheme, values: remaining }), ..own };
+        let field =
+            Varied { remaining: Some(Remaining { mesh: &self.mesh, scheme: &self.scheme, values: remaining }), ..own };
         let both = u[..size].chunks_exact(n).zip(y.chunks_exact(n));
         let profile: Vec<f64> = both.flat_map(|(x, y)| x.iter().chain(y)).copied().collect();
         let sizes = [scale, scale].concat();
