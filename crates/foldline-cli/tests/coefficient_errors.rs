@@ -156,3 +156,29 @@ fn a_zero_hopf_point_on_an_invariant_plane_has_no_coefficients() {
     assert!(point.coefficients.is_empty(), "{}", point.normal_form());
     assert!(point.normal_form().starts_with("no coefficients: c of the normal form"), "{}", point.normal_form());
 }
+
+/// Two coupled cells x' = a x - x⁵ + k (y - x), k = 0.3: at a = 5 k / 2 both mixed branches leave the antisymmetric one,
+/// x = -y, at x⁴ = a - 2 k. b = -4 is the derivative of the eigenvalue a - 5 x⁴ there. Along one of the mixed branches the
+/// point is a vertex, which is located only to the square root of the error of the parameter.
+#[test]
+fn coefficients_of_a_pitchfork_are_the_same_from_the_branch_that_turns_back() {
+    let model = "[parameters]\na = 0.3\n[states]\nx = \"a*x - x^5 + 0.3*(y - x)\"\ny = \"a*y - y^5 + 0.3*(x - y)\"\n";
+    for tolerance in [1e-5, 1e-6, 1e-8] {
+        let study = format!(
+            "tolerance = {tolerance:e}\n[[seed]]\nname = \"s\"\nstate = {{ x = 0, y = 0 }}\nparameters = {{ a = -0.5 }}\n\
+             [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"a\"\nrange = [-0.5, 1.5]\nswitch = {{ branch-point = 2 }}\n"
+        );
+        let diagram = grown(model, &study);
+        let special = diagram.branches.iter().flat_map(|branch| &branch.special);
+        let there: Vec<&SpecialPoint> =
+            special.filter(|special| (special.point.parameters[0] - 0.75).abs() < 1e-3).collect();
+        assert_eq!(there.len(), 2, "along both branches");
+        for point in there {
+            // c = √60 for the null vector (1, 1)/√2, after elimination of (1, -1).
+            for (k, known, largest) in [(0, 0.0, 1e-2), (1, -4.0, 1e-2), (2, 60f64.sqrt(), 1e-2)] {
+                let (value, error) = (point.coefficients[k], point.coefficient_errors[k]);
+                assert!((value - known).abs() <= error && error < largest, "{tolerance:e} {k}: {value} ± {error:e}");
+            }
+        }
+    }
+}

@@ -181,13 +181,29 @@ fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
     let sizes = &uncertain.sizes;
     let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x / sizes.get(i).copied().unwrap_or(1.0)).collect();
-    let measured = uncertain.measured_in_sizes(&|sample| sample.local.crossing(&along, pitchfork, sizes));
-    let mut found = measured.ok_or(NONE)?;
+    let measured = |at: &Uncertain| {
+        at.measured_in_sizes(&|sample| sample.local.crossing(&along, pitchfork, sizes)).ok_or(NONE.to_string())
+    };
+    let mut found = measured(uncertain)?;
     if pitchfork {
+        let beside = Local::new(setting.field, uncertain.at).and_then(|local| local.vertex());
+        if let Some((point, beside)) = beside.and_then(|off| Some((moved(uncertain.at, &off)?, found.clone()))) {
+            found = measured(&Uncertain::new(setting, &point, uncertain.error))?;
+            for (k, error) in found.errors.iter_mut().enumerate() {
+                *error += (found.values[k] - beside.values[k]).abs();
+            }
+        }
         // By symmetry it is 0, or at most the observed value.
         found.errors[0] = quadratic.errors[0] + quadratic.values[0].abs();
     }
     Ok(found)
+}
+
+/// An equilibrium displaced by `off` `[n]`.
+fn moved(at: &Point, off: &[f64]) -> Option<Point> {
+    let Solution::Equilibrium(x) = &at.solution else { return None };
+    let solution = Solution::Equilibrium(x.iter().zip(off).map(|(x, off)| x + off).collect());
+    Some(Point { solution, ..at.clone() })
 }
 
 /// Tangent of a branch in states and parameters `[n + k]` per unit of its parameter.

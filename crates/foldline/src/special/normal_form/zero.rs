@@ -25,7 +25,11 @@ impl Local<'_> {
         // An interpolated tangent satisfies the linear equations only approximately.
         let off = self.bordered(&vectors, &self.derivative(&[along]))?;
         let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x - off.get(i).copied().unwrap_or(0.0)).collect();
-        let (along, [q, p]) = (&along[..], vectors);
+        let [q, p] = vectors;
+        // At a pitchfork b does not depend on the component along q, which is large on the branch that turns back.
+        let own = if pitchfork { dot(&q, &along[..self.n]) } else { 0.0 };
+        let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x - own * q.get(i).unwrap_or(&0.0)).collect();
+        let along = &along[..];
         let size = dot(&p, &q);
         let b = dot(&p, &self.derivative(&[&q, along])) / size;
         // The null vector is of unit length in the units of the model.
@@ -50,6 +54,14 @@ impl Local<'_> {
             v.iter().zip(sizes).map(|(v, size)| (v * size.powi(power)).powi(2)).sum::<f64>().sqrt()
         };
         Some(dot(&p, &q) / (norm(&q, -1) * norm(&p, 1)))
+    }
+
+    /// Displacement `[n]` to the vertex of a pitchfork, at which a vanishes: a point located along the branch that turns back is
+    /// off by the square root of the error of its parameter.
+    pub fn vertex(&self) -> Option<Vec<f64>> {
+        let [q, _] = self.null_vectors()?;
+        let off = -self.fold()? / (3.0 * self.cusp()?);
+        off.is_finite().then(|| q.iter().map(|q| off * q).collect())
     }
 
     /// True if a ξ² is less than c ξ³ at the amplitude ξ at which ξ q is `share` of the `scales` `[n]` of the states.
