@@ -342,3 +342,82 @@ fn scales_are_those_of_the_profiles() {
     // u = (cosh(10 (t - 1/2)) / cosh 5 - 1) / 100.
     near(value(&study.model, "u@0.5", point), (1.0 / 5.0f64.cosh() - 1.0) / 100.0, 1e-9);
 }
+
+/// A rod that is equally stiff in two planes, with restoring forces that tell directions apart: at p = (kπ)² a null space of two
+/// dimensions, at which the branches along u, along v and along both diagonals leave. The amplitude of sin kπs on each follows
+/// from the reduced equation at small amplitude.
+const SQUARE: &str = "[interval]\nlength = 1\nvariable = \"s\"\n[parameters]\np = 5\n[states]\n\
+    \"u''\" = \"-p*(u - u^3 - c*u*v^2)\"\n\"v''\" = \"-p*(v*stiff - v^3 - c*v*u^2)\"\n\
+    [boundary]\na = \"u@0\"\nb = \"u@1\"\nc = \"v@0\"\nd = \"v@1\"\n";
+
+#[test]
+fn branch_points_with_a_null_space_of_two_dimensions_are_found_from_any_start() {
+    let model = SQUARE.replace("p = 5", "p = 5\nc = 3\nstiff = 1");
+    for (low, high, switch) in [(5.0, 100.0, true), (5.0, 60.0, false), (2.0, 100.0, false), (4.3, 200.0, false)] {
+        let mut study = format!(
+            "[[seed]]\nname = \"z\"\nstate = \"zero\"\n[[branch]]\nname = \"b\"\nfrom = \"z\"\nfree = \"p\"\nrange = [{low}, {high}]\n"
+        );
+        if switch {
+            study += "switch = { branch-point = 1 }\n";
+        }
+        let (_, diagram) = given(&model, &study);
+        let points = &diagram.branch("b").unwrap().special;
+        let expected: Vec<f64> = (1..9).map(|k| (k as f64 * PI).powi(2)).filter(|p| (low..high).contains(p)).collect();
+        assert_eq!(points.len(), expected.len(), "{low} {high}");
+        for (point, p) in points.iter().zip(&expected) {
+            assert_eq!((point.kind, point.kernel()), (Kind::BranchPoint, 2));
+            assert!(
+                (point.point.parameters[0] - p).abs() <= point.error * (1.0 + p),
+                "{:?} {p}",
+                point.point.parameters[0]
+            );
+        }
+        if switch {
+            assert_eq!(diagram.branches.len(), 1 + 4 * expected.len());
+        }
+    }
+}
+
+#[test]
+fn two_branch_points_that_nearly_coincide_are_told_apart() {
+    for gap in [1e-2, 1e-4, 1e-6] {
+        let model = SQUARE.replace("p = 5", &format!("p = 5\nc = 3\nstiff = {}", 1.0 + gap));
+        let study = "[[seed]]\nname = \"z\"\nstate = \"zero\"\n[[branch]]\nname = \"b\"\nfrom = \"z\"\nfree = \"p\"\nrange = [5, 30]\n";
+        let (_, diagram) = given(&model, study);
+        let found: Vec<f64> = diagram.branch("b").unwrap().special.iter().map(|s| s.point.parameters[0]).collect();
+
+        let [first, second] = [PI * PI / (1.0 + gap), PI * PI];
+        assert_eq!(found.len(), 2, "{gap:e}: {found:?}");
+        assert!((found[0] - first).abs() < 1e-6 && (found[1] - second).abs() < 1e-6, "{gap:e}: {found:?}");
+    }
+}
+
+/// Bratu's problem at p = 1: u = 2 ln(cosh c/cosh(c (1 - 2t))) with cosh c = c √(8/p), which has two roots.
+#[test]
+fn another_solution_is_found_from_the_same_profile() {
+    let model = "[interval]\nlength = 1\n[parameters]\np = 1\n[states]\n\"u''\" = \"-p*exp(u)\"\n[boundary]\na = \"u@0\"\nb = \"u@1\"\n";
+    let rest = "free = \"p\"\nrange = [0.5, 2]\nuntil = 1.5\n";
+    let study = format!(
+        "[[seed]]\nname = \"cold\"\nstate = \"zero\"\n\
+         [[seed]]\nname = \"hot\"\nstate = \"zero\"\nbesides = [\"cold\"]\n\
+         [[seed]]\nname = \"third\"\nstate = \"zero\"\nbesides = [\"cold\", \"hot\"]\n\
+         [[branch]]\nname = \"c\"\nfrom = \"cold\"\n{rest}[[branch]]\nname = \"h\"\nfrom = \"hot\"\n{rest}[[branch]]\nname = \"t\"\nfrom = \"third\"\n{rest}"
+    );
+    let (study, diagram) = given(model, &study);
+    let middle = |name: &str| {
+        let branch = diagram.branch(name).unwrap();
+        let start = branch.points.iter().min_by_key(|point| point.position.abs()).unwrap();
+        Quantity::named("u@0.5", &study.model).unwrap().on(start, &study.model).unwrap()
+    };
+    for (name, mut c) in [("c", 0.4), ("h", 3.0)] {
+        for _ in 0..50 {
+            let (f, slope) = (f64::cosh(c) - c * 8f64.sqrt(), f64::sinh(c) - 8f64.sqrt());
+            c -= f / slope;
+        }
+        let known = 2.0 * c.cosh().ln();
+        assert!((middle(name) - known).abs() < 1e-5, "{name}: {} {known}", middle(name));
+    }
+    let third = diagram.branch("t").unwrap();
+    let Some(Ending::NoStart(why)) = &third.ends[0] else { panic!("{:?}", third.ends) };
+    assert!(why.starts_with("no solution besides cold, hot was found"), "{why}");
+}

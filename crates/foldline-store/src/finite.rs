@@ -35,7 +35,7 @@ pub(crate) fn check_seeds(
         };
         let failing = match source {
             SeedSource::State(state) => not_finite(model, state, &seed.parameters).map(|c| (c, state.clone())),
-            SeedSource::Cycle(cycle) => {
+            SeedSource::Cycle(cycle) | SeedSource::Besides(cycle, _) => {
                 let state = &cycle.profile[..cycle.dim()];
                 not_finite(model, state, &seed.parameters).map(|c| (c, state.to_vec()))
             }

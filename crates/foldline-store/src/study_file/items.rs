@@ -100,7 +100,8 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
     let family = match &seed.source {
         SeedSource::Attractor(AttractorKey::Equilibrium) => Some(Family::Equilibrium),
         SeedSource::Attractor(AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_))
-        | SeedSource::Cycle(_) => Some(Family::Cycle),
+        | SeedSource::Cycle(_)
+        | SeedSource::Besides(..) => Some(Family::Cycle),
         SeedSource::Torus(_) | SeedSource::QuasiPeriodic => Some(Family::Torus),
         SeedSource::State(_) => None,
     };

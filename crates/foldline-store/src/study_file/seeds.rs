@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 11] = [
+pub(super) const KEYS: [&str; 12] = [
     "name",
     "description",
     "attractor",
@@ -21,6 +21,7 @@ pub(super) const KEYS: [&str; 11] = [
     "state",
     "cycle",
     "profile",
+    "besides",
     "torus",
     "parameters",
     "samples",
@@ -53,6 +54,10 @@ pub(super) fn read(
         if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {
             totals_of(walk, value, table.get("parameters"), model, state, &mut parameters);
         }
+        let meant = match table.get("besides") {
+            Some(value) => besides(walk, value, meant, model, &taken),
+            None => meant,
+        };
         let source = match table.get("torus").map(|value| (value, walk.boolean(value, "`torus`"))) {
             Some((value, Some(true))) => of_torus(walk, value, meant, model),
             _ => lasting(walk, table, meant, model, &parameters),
@@ -67,6 +72,30 @@ pub(super) fn read(
         seeds.push((span, SeedPlan { name, source, parameters, samples, random: random.unwrap_or(RANDOM) }));
     }
     seeds
+}
+
+/// Reads the earlier seeds whose solutions the one from this profile must not be.
+fn besides(walk: &mut Walk, value: &Value, meant: SeedSource, model: &Model, earlier: &[&str]) -> SeedSource {
+    const HINT: &str = "list the seeds whose solutions are known: `besides = [\"cold\"]`";
+    if model.conditions() == [0, 0] {
+        let message = "only seeds of boundary-value problems have `besides`";
+        walk.report(value.span(), message, "other equilibria and cycles are found from samples: `foldline explore`");
+        return meant;
+    }
+    let SeedSource::Cycle(guess) = meant else { return meant };
+    let Some(all) = value.get_ref().as_array() else {
+        walk.report(value.span(), "`besides` must be a list of seeds", HINT);
+        return SeedSource::Cycle(guess);
+    };
+    let mut others = Vec::new();
+    for one in all {
+        let name = one.get_ref().as_str().unwrap_or_default();
+        match earlier.iter().position(|other| *other == name) {
+            Some(index) => others.push(index),
+            None => walk.report(one.span(), format!("no earlier seed is called {name:?}"), suggest(name, earlier)),
+        }
+    }
+    SeedSource::Besides(guess, others)
 }
 
 /// Reads the start from which a motion settles in the cells of a map: by default a cycle of a forced model, a fixed point of

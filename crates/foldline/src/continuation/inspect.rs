@@ -214,8 +214,14 @@ impl Follow<'_> {
         let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
         let found: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let fits = !lost && explains(&found, left.point.unstable as i64, right.point.unstable as i64);
+        let mut even = false;
         if self.settings.stability && fits && fold_test == FoldTest::Slope && depth < CLOSE {
-            match self.exchanged(&stretch, &right.point, history, cost) {
+            let branch_points = self.monitors.iter().position(|monitor| monitor.kind() == Kind::BranchPoint);
+            let touching = branch_points
+                .filter(|_| quiet)
+                .and_then(|k| self.touching(k, [at_left[k], at_right[k]], &stretch, history, cost));
+            even = touching.is_some();
+            match touching.or_else(|| self.exchanged(&stretch, &right.point, history, cost)) {
                 Some(Exchange::Apart(there)) => cut_there = Some(there),
                 Some(Exchange::Together(kind, found)) if quiet => {
                     let (times, jump) = match kind {
@@ -358,7 +364,7 @@ impl Follow<'_> {
                 Kind::BranchPoint if self.settings.stability => {
                     let (ends, at) = ([&left.point, &right.point], &found.station.point);
                     let around = Around { ends, at, length: stretch.length, error: found.error };
-                    around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 })
+                    if even { 2 } else { around.vanishing(if is_cycle(left) { 1.0 } else { 0.0 }) }
                 }
                 Kind::PeriodDoubling if opposite => 2,
                 _ => 1,

@@ -24,6 +24,7 @@ mod allowance;
 pub mod corrector;
 mod diagnosis;
 mod ends;
+mod even;
 pub mod follow;
 pub mod inspect;
 mod judge;

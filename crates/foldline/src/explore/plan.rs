@@ -30,6 +30,8 @@ pub enum SeedSource {
     State(Vec<f64>),
     /// Limit of Newton's method from this cycle.
     Cycle(Cycle),
+    /// Solution of a boundary-value problem from this profile, other than those of the earlier seeds with these indices.
+    Besides(Cycle, Vec<usize>),
     /// The cycle from this source as a torus, at parameter values at which the forcing has no effect.
     Torus(Box<SeedSource>),
     /// The torus of a quasi-periodic motion that is found by simulation.

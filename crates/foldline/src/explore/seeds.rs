@@ -162,8 +162,10 @@ impl<'p> Seeds<'p> {
             return Err("under two forcing frequencies the response is a torus; ask for `attractor = \"torus\"`".into());
         }
         let point = match &seed.source {
-            SeedSource::Cycle(cycle) if system.is_open() => from_arc(system, seed, plan.tolerance, cycle)?,
-            SeedSource::Cycle(cycle) => {
+            SeedSource::Cycle(_) | SeedSource::Besides(..) if system.is_open() => {
+                from_arc(system, plan, index, &seed.parameters)?
+            }
+            SeedSource::Cycle(cycle) | SeedSource::Besides(cycle, _) => {
                 let point = from_cycle(system, seed, plan.tolerance, cycle)?;
                 self.tell_turns(&seed.name, cycle, &point);
                 point
@@ -283,7 +285,11 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
     let seed = &plan.seeds[index];
     let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
         SeedSource::Attractor(key) => Some(key),
-        SeedSource::Torus(_) | SeedSource::QuasiPeriodic | SeedSource::State(_) | SeedSource::Cycle(_) => None,
+        SeedSource::Torus(_)
+        | SeedSource::QuasiPeriodic
+        | SeedSource::State(_)
+        | SeedSource::Cycle(_)
+        | SeedSource::Besides(..) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
     let newton = if system.field.iterated() { None } else { newton_from_rest(system, plan, seed) };

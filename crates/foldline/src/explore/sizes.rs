@@ -67,7 +67,7 @@ pub fn state_scales(model: &Model, plan: &Plan) -> Vec<f64> {
     }
     let profiles = plan.seeds.iter().flat_map(|seed| match &seed.source {
         SeedSource::State(state) => state.chunks_exact(model.dim().max(1)),
-        SeedSource::Cycle(cycle) => cycle.profile.chunks_exact(model.dim().max(1)),
+        SeedSource::Cycle(cycle) | SeedSource::Besides(cycle, _) => cycle.profile.chunks_exact(model.dim().max(1)),
         SeedSource::Attractor(_) | SeedSource::Torus(_) | SeedSource::QuasiPeriodic => [].chunks_exact(1),
     });
     of_states(model, &profiles.map(|state| (state.to_vec(), Vec::new())).collect::<Vec<Place>>())
@@ -85,7 +85,7 @@ pub(super) fn places(model: &Model, plan: &Plan) -> Vec<Place> {
     for seed in &plan.seeds {
         match &seed.source {
             SeedSource::State(state) => starts.push((state.clone(), seed.parameters.clone())),
-            SeedSource::Cycle(cycle) => {
+            SeedSource::Cycle(cycle) | SeedSource::Besides(cycle, _) => {
                 let n = model.dim().max(1);
                 let states = cycle.profile.chunks_exact(n).step_by(1 + cycle.profile.len() / (4 * n));
                 starts.extend(states.map(|state| (state.to_vec(), seed.parameters.clone())));
