@@ -182,3 +182,26 @@ fn coefficients_of_a_pitchfork_are_the_same_from_the_branch_that_turns_back() {
         }
     }
 }
+
+/// x' = mu x - a x² - 0.3 x³ + x z, z' = -z + x²/2, in the states u = x and w = x + z/1000: x = 0 is crossed where mu = 0, with the
+/// quadratic coefficient -a/√2 for the null vector (1, 1)/√2. The states nearly coincide, so that an error of their difference
+/// is large beside z.
+#[test]
+fn a_small_quadratic_term_between_states_that_nearly_coincide_is_no_pitchfork() {
+    for (a, tolerance) in [(0.01, 1e-6), (0.01, 1e-4), (1.0, 1e-6), (1e-4, 1e-8)] {
+        let model = format!(
+            "[parameters]\nmu = -1.0\n[definitions]\nx = \"u\"\nz = \"(w-u)/0.001\"\n[states]\n\
+             u = {{ range = [-2, 2], equation = \"mu*x - {a:?}*x^2 - 0.3*x^3 + x*z\" }}\n\
+             w = {{ range = [-2, 2], equation = \"mu*x - {a:?}*x^2 - 0.3*x^3 + x*z + 0.001*(-z + 0.5*x^2)\" }}\n"
+        );
+        let study = format!(
+            "tolerance = {tolerance:e}\n[[seed]]\nname = \"o\"\nstate = \"zero\"\n\
+             [[branch]]\nname = \"e\"\nfrom = \"o\"\nfree = \"mu\"\nrange = [-1, 1]\n"
+        );
+        let diagram = grown(&model, &study);
+        let [point] = &diagram.branch("e").unwrap().special[..] else { panic!("one point") };
+        honest(point, -a / 2f64.sqrt(), f64::INFINITY);
+        let said = point.normal_form();
+        assert!(!said.contains("pitchfork, s"), "{said}");
+    }
+}

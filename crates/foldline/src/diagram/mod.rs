@@ -640,7 +640,7 @@ impl SpecialPoint {
     /// and p₂₂ have the same sign, otherwise difficult.
     pub fn case(&self) -> Option<&'static str> {
         match (self.kind, self.coefficients.len()) {
-            (Kind::BranchPoint, 2) => Some("transcritical"),
+            (Kind::BranchPoint, 2) => self.certain(0).map(|_| "transcritical"),
             (Kind::BranchPoint, 3) => Some("pitchfork"),
             (Kind::DoubleHopf, 4..) if self.certain(0)? * self.certain(3)? > 0.0 => Some("simple"),
             (Kind::DoubleHopf, 4..) => Some("difficult"),

@@ -2,7 +2,9 @@
 //!
 //! **Idea.** The error of a coefficient has two sources: the error of the point and rounding. Both are sampled. The
 //! coefficient is recomputed at points displaced by the error bound, with derivatives perturbed by their rounding
-//! error, all with random signs; the resulting changes give its error. Displacements that would themselves vanish in
+//! error, all with random signs; the resulting changes give its error. The point satisfies the equations, so the displaced ones
+//! do too, but for the component of f that vanishes with the critical eigenvalue: what remains are displacements of the parameters
+//! and along the critical eigenvector. States that a stiff direction ties together are then not displaced apart. Displacements that would themselves vanish in
 //! rounding are enlarged, and their effect is reduced by the same factor.
 //!
 //! Rounding is relative to f at states of their characteristic sizes. A nonlinearity too small to affect f there yields
@@ -77,7 +79,20 @@ impl<'s, 'f> Uncertain<'s, 'f> {
             // Displace both members of a pair alike.
             *z = Complex64::new(z.re, z.im * (1.0 + if seed.is_multiple_of(2) { size } else { -size }));
         }
-        point
+        self.settled(&point).unwrap_or(point)
+    }
+
+    /// The point after one step of Newton's method orthogonal to the critical eigenvector.
+    fn settled(&self, at: &Point) -> Option<Point> {
+        let Solution::Equilibrium(x) = &at.solution else { return None };
+        let local = Local::new(self.setting.field, at)?.in_units(&self.sizes);
+        let mut f = vec![0.0; x.len()];
+        let parameters = Parameters::Shared(&at.parameters);
+        self.setting.field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[], signs: &[] }, &mut f);
+        f.iter_mut().zip(&self.sizes).for_each(|(f, size)| *f /= size);
+        let step = local.bordered(&local.null_vectors()?, &f)?;
+        let moved: Vec<f64> = x.iter().zip(step.iter().zip(&self.sizes)).map(|(x, (d, s))| x - d * s).collect();
+        moved.iter().all(|x| x.is_finite()).then(|| Point { solution: Solution::Equilibrium(moved), ..at.clone() })
     }
 
     /// True if some switch of the field changes sign within the error of the point.

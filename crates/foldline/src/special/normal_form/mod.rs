@@ -174,29 +174,54 @@ fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     let setting = uncertain.setting;
     let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
     let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;
-    // On the branch that turns back, an error ε of the parameter is an error √ε of the state, which changes a by about
-    // c √ε.
-    let share = PITCHFORK.max(uncertain.error.sqrt());
-    let nearly = Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, share));
-    let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
     let sizes = &uncertain.sizes;
     let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x / sizes.get(i).copied().unwrap_or(1.0)).collect();
+    let turning = turns_back(uncertain, &along).ok_or(NONE)?;
+    // On the branch that turns back, an error ε of the parameter is an error √ε of the state, which changes a by about
+    // c √ε.
+    let share = if turning { PITCHFORK.max(uncertain.error.sqrt()) } else { PITCHFORK };
+    let local = Local::new(setting.field, uncertain.at);
+    let nearly = local.as_ref().and_then(|local| local.is_pitchfork(setting.scales, share)) == Some(true);
+    let (a, error) = (quadratic.values[0], quadratic.errors[0]);
+    let pitchfork = nearly || a.abs() <= error;
     let measured = |at: &Uncertain| {
         at.measured_in_sizes(&|sample| sample.local.crossing(&along, pitchfork, sizes)).ok_or(NONE.to_string())
     };
     let mut found = measured(uncertain)?;
     if pitchfork {
-        let beside = Local::new(setting.field, uncertain.at).and_then(|local| local.vertex());
-        if let Some((point, beside)) = beside.and_then(|off| Some((moved(uncertain.at, &off)?, found.clone()))) {
-            found = measured(&Uncertain::new(setting, &point, uncertain.error))?;
+        let vertex = local.as_ref().filter(|_| turning).and_then(|local| moved(uncertain.at, &local.vertex()?));
+        if let Some(point) = vertex {
+            let beside = std::mem::replace(&mut found, measured(&Uncertain::new(setting, &point, uncertain.error))?);
             for (k, error) in found.errors.iter_mut().enumerate() {
                 *error += (found.values[k] - beside.values[k]).abs();
             }
         }
         // By symmetry it is 0, or at most the observed value.
-        found.errors[0] = quadratic.errors[0] + quadratic.values[0].abs();
+        found.errors[0] = error + a.abs();
+        // An error that is not small leaves it open whether a vanishes: at the largest amplitude it is compared with the cubic
+        // term, and with the linear one at one unit of the parameter.
+        let reach = local.and_then(|local| local.reach(setting.scales)).ok_or(NONE)?;
+        let others = (found.values[2].abs() * reach * reach).max(found.values[1].abs() * setting.unit());
+        if !nearly && error * reach > share * others {
+            found.values = vec![a, found.values[1]];
+            found.errors = vec![error, found.errors[1]];
+            found.remark = "a transcritical point or a pitchfork".into();
+        }
     }
     Ok(found)
+}
+
+/// True if a branch leaves a branch point along its null vector: `along` `[n + k]` is the tangent per unit of the parameter, with
+/// states in terms of their sizes.
+fn turns_back(uncertain: &Uncertain, along: &[f64]) -> Option<bool> {
+    /// Displacement along the null vector over one unit of the parameter, relative to the sizes of the states, that counts as none.
+    const NONE: f64 = 1e-3;
+    let local = Local::new(uncertain.setting.field, uncertain.at)?.in_units(&uncertain.sizes);
+    let [q, _] = local.null_vectors()?;
+    let states = &along[..q.len()];
+    let own = states.iter().zip(&q).map(|(a, q)| a * q).sum::<f64>();
+    let rest = states.iter().zip(&q).map(|(a, q)| (a - own * q).powi(2)).sum::<f64>().sqrt();
+    Some(own.abs() > rest + NONE / uncertain.setting.unit())
 }
 
 /// An equilibrium displaced by `off` `[n]`.

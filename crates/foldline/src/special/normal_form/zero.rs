@@ -66,9 +66,13 @@ impl Local<'_> {
 
     /// True if a ξ² is less than c ξ³ at the amplitude ξ at which ξ q is `share` of the `scales` `[n]` of the states.
     pub fn is_pitchfork(&self, scales: &[f64], share: f64) -> Option<bool> {
+        Some(self.fold()?.abs() <= share * self.reach(scales)? * self.cusp()?.abs())
+    }
+
+    /// The amplitude ξ at which ξ q reaches the `scales` `[n]` of the states.
+    pub fn reach(&self, scales: &[f64]) -> Option<f64> {
         let [q, _] = self.null_vectors()?;
-        let reach = 1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
-        Some(self.fold()?.abs() <= share * reach * self.cusp()?.abs())
+        Some(1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs())))
     }
 
     /// a and b of (7); `None` if both vanish, by a symmetry.
