@@ -242,3 +242,54 @@ fn no_chenciner_point_is_read_from_the_rounding_of_a_coefficient_that_vanishes()
         assert!(text.contains("\nC ") && points(&text, "C", "chenciner").is_empty(), "{text}");
     }
 }
+
+/// States of any size: the doublings of the logistic map at r = 3 and 1 + √6 do not depend on the unit of x.
+#[test]
+fn switching_at_period_doublings_does_not_depend_on_the_unit_of_a_state() {
+    for unit in ["1", "1e-6", "1e-9", "1e6"] {
+        let model = format!(
+            "[parameters]\nr = 2.5\n[states]\nx = {{ range = [0, {unit}] }}\n[map]\nx = \"r*x*(1 - x/{unit})\"\n"
+        );
+        let study = "[[seed]]\nname = \"s\"\nattractor = \"fixed-point\"\n[[branch]]\nname = \"f\"\nfrom = \"s\"\nfree = \"r\"\n\
+            range = [2.5, 3.5]\nswitch = { period-doubling = 1 }\n";
+        let found = crate::permuted::run(&model, study);
+        let doublings: Vec<f64> = found
+            .branches
+            .iter()
+            .flat_map(|branch| &branch.special)
+            .filter(|special| special.kind == Kind::PeriodDoubling)
+            .map(|special| special.point.parameters[0])
+            .collect();
+        assert_eq!(doublings.len(), 2, "{unit}: {doublings:?}");
+        assert!(
+            (doublings[0] - 3.0).abs() < 1e-7 && (doublings[1] - 1.0 - 6f64.sqrt()).abs() < 1e-7,
+            "{unit}: {doublings:?}"
+        );
+    }
+}
+
+/// A random cubic field whose curve of folds has a Bogdanov–Takens point next to a cusp, where the null vector turns quickly.
+/// From there a Newton iteration on f = 0 and two vanishing coefficients of the characteristic polynomial leads to
+/// (p, q) = (0.1029802999, -0.0989555757).
+#[test]
+fn a_bogdanov_takens_point_is_listed_once_where_the_null_vector_turns_quickly() {
+    let model = r#"[parameters]
+p = 0.0
+q = 0.0
+[states]
+x0 = "(0.35+-0.58*p)*x0 + (-1.159+0.897*p)*x1 + (0.87+-0.748*p)*x2 + -0.331*p + -0.392*x0*x2 + -1.642*x1*x2 + -0.423*x0*x0*x0 + 1.434*x0*x0*x1 + 0.774*x0*x0*x2 + -0.798*x0*x1*x2 + -0.306*x1*x1*x2 + -0.567*x1*x2*x2 + -0.199*q*x0 + -0.144*q*x1 + 1.382*q*x2 + -2.256*q"
+x1 = "(-0.733+1.382*p)*x0 + (0.514+0.588*p)*x1 + (0.25+0.671*p)*x2 + -0.392*p + -0.474*x0*x1 + 1.648*x0*x2 + 1.451*x1*x1 + 0.62*x1*x2 + -0.642*x0*x0*x1 + -0.5940000000000001*x0*x0*x2 + 0.648*x0*x1*x1 + 0.41400000000000003*x0*x1*x2 + 1.323*x0*x2*x2 + -1.0*x1*x1*x1 + 0.5489999999999999*x1*x1*x2 + -0.237*x1*x2*x2 + 1.599*q*x0 + -0.443*q*x1 + 1.58*q*x2 + -0.555*q"
+x2 = "(0.392+0.423*p)*x0 + (-0.043+-0.551*p)*x1 + (-0.096+0.375*p)*x2 + -1.008*p + 1.376*x0*x0 + -0.644*x0*x1 + -0.03*x1*x1 + -0.098*x1*x2 + 1.02*x0*x0*x0 + 0.138*x0*x0*x1 + 2.604*x0*x1*x2 + -0.96*x1*x1*x2 + -1.0*x2*x2*x2 + 0.288*q*x0 + 0.187*q*x1 + -0.879*q*x2 + 0.132*q"
+"#;
+    let study = "[[seed]]\nname = \"o\"\nstate = \"zero\"\n[[branch]]\nname = \"e\"\nfrom = \"o\"\nfree = \"p\"\nrange = [-1, 1]\n\
+        [[curve]]\nname = \"c\"\nof = \"e\"\nhold = \"fold\"\nnear = 0.6833890963418737\nfree = \"q\"\nrange = [-1, 1]\nbranch-range = [-2, 2]\n";
+    let found = crate::permuted::run(model, study);
+    let points = &found.branch("c").unwrap().special;
+    let there: Vec<[f64; 2]> = points
+        .iter()
+        .filter(|special| special.kind == Kind::BogdanovTakens && (special.point.parameters[0] - 0.103).abs() < 1e-3)
+        .map(|special| [special.point.parameters[0], special.point.parameters[1]])
+        .collect();
+    assert_eq!(there.len(), 1, "{there:?}");
+    assert!((there[0][0] - 0.1029802999).abs() < 1e-9 && (there[0][1] + 0.0989555757).abs() < 1e-9, "{there:?}");
+}

@@ -522,6 +522,11 @@ pub trait Monitor: Send + Sync {
         Sight::Stability
     }
 
+    /// True if the sign of the value has a meaning only for one reference: it depends on the orientation of vectors there.
+    fn is_oriented(&self) -> bool {
+        false
+    }
+
     /// True if the zero may still be confirmed, judging by the nearby point `at`.
     fn possible(&self, _at: &Point) -> bool {
         true

@@ -157,6 +157,7 @@ impl Follow<'_> {
             let monitor = by_spectrum.as_deref().unwrap_or(own);
             let values = match &by_spectrum {
                 Some(other) => [left, right].map(|station| other.value(&left.point, &station.point)),
+                None if own.is_oriented() => [left, right].map(|station| own.value(&left.point, &station.point)),
                 None => values,
             };
             if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {

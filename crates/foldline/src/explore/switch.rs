@@ -105,9 +105,10 @@ pub(super) fn step_off_from(
             problem.set_mesh(&mesh);
         }
         let along = |s: f64| -> Vec<f64> { base.iter().zip(direction).map(|(b, d)| b + s * d).collect() };
-        // The phase reference lies on the new branch: the base may have no phase at all (a Hopf point).
-        problem.anchor(&along(1.0));
+        // Lengths are measured by the sizes of the states at the base.
+        problem.anchor(base);
         let norm = problem.dot(direction, direction).sqrt();
+        // The phase reference lies on the new branch: the base may have no phase at all (a Hopf point).
         problem.anchor(&along(sign * distance / norm));
         let row: Vec<f64> = direction.iter().map(|d| sign * d / norm).collect();
         let scale = problem.dot(&row, &row).sqrt();

@@ -19,9 +19,9 @@ use crate::contract::{Batch, Parameters, VectorField};
 /// Sample points in excess of the number of states.
 const MORE: usize = 8;
 /// Number of points at which a law is tested, and sizes of the states there, so that terms that switch on at large
-/// states are seen.
-const TESTED: usize = 32;
-const SIZES: [f64; 4] = [1.0, 10.0, 1e2, 1e3];
+/// states are seen, and those that exp(-x/ε) hides at states far above ε.
+const TESTED: usize = 40;
+const SIZES: [f64; 8] = [1.0, 10.0, 1e2, 1e3, 0.1, 1e-3, 1e-6, 1e-9];
 /// Pivot, relative to the largest, that counts as zero; with a few hundred rows, rounding leaves about 1e-13.
 const ZERO: f64 = 1e-9;
 /// Largest residual of a law, relative to its terms: in working precision, and in twice that.
@@ -79,7 +79,7 @@ pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     let places = Places { field, fixed: None };
-    let rows: Vec<f64> = (0..MORE).filter_map(|k| places.derivatives(k)).flatten().collect();
+    let rows: Vec<f64> = (0..MORE).filter_map(|k| places.derivatives(places.at(k))).flatten().collect();
     let moves = |s: &Vec<f64>, fx: &[f64]| {
         fx.chunks_exact(n).all(|row| {
             let terms = row.iter().zip(s).map(|(a, b)| a * b);
@@ -87,7 +87,8 @@ pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
             terms.sum::<f64>().abs() <= LEFT[0] * size
         })
     };
-    let holds = |s: &Vec<f64>| (MORE..2 * MORE).filter_map(|k| places.derivatives(k)).all(|fx| moves(s, &fx));
+    let further = || (MORE..MORE + 2 * SIZES.len()).filter_map(|k| places.derivatives(places.sized(k)));
+    let holds = |s: &Vec<f64>| further().all(|fx| moves(s, &fx));
     if rows.is_empty() { Vec::new() } else { null_space(rows, n).into_iter().filter(holds).collect() }
 }
 
@@ -155,38 +156,39 @@ impl Places<'_> {
         f.iter().all(|value| value.is_finite()).then_some(f)
     }
 
-    fn jacobian(&self, k: usize) -> Option<Vec<f64>> {
-        let [x, parameters, times] = self.at(k);
+    fn jacobian(&self, [x, parameters, times]: &[Vec<f64>; 3]) -> Option<Vec<f64>> {
         let (n, mut f) = (x.len(), vec![0.0; x.len()]);
         let mut fx = vec![0.0; n * n];
-        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times, signs: &[] };
         self.field.linearise(at, &[], &mut f, &mut fx, &mut []);
         fx.iter().all(|value| value.is_finite()).then_some(fx)
     }
 
     /// The Jacobian, then the gradients of the switches, which a shift must not change either: rows `[n]`.
-    fn derivatives(&self, k: usize) -> Option<Vec<f64>> {
-        let [x, parameters, times] = self.at(k);
+    fn derivatives(&self, place: [Vec<f64>; 3]) -> Option<Vec<f64>> {
+        let [x, parameters, times] = &place;
         let (n, count) = (x.len(), self.field.switch_count());
         let [mut h, mut hx, mut ht] = [count, count * n, count].map(|size| vec![0.0; size]);
-        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times, signs: &[] };
         self.field.linearise_switches(at, &[], [&mut h, &mut hx, &mut [], &mut ht]);
-        hx.iter().all(|value| value.is_finite()).then(|| self.jacobian(k)).flatten().map(|fx| [fx, hx].concat())
+        hx.iter().all(|value| value.is_finite()).then(|| self.jacobian(&place)).flatten().map(|fx| [fx, hx].concat())
     }
 
     /// True if c·f vanishes wherever f is defined, at points of every size and sign.
     fn keep(&self, c: &[f64]) -> bool {
         let first = self.field.dim() + MORE;
         (first..first + TESTED).all(|k| {
-            let [mut x, parameters, times] = self.at(k);
-            if self.fixed.is_none() {
-                let size = SIZES[k % SIZES.len()];
-                x.iter_mut()
-                    .enumerate()
-                    .for_each(|(i, x)| *x *= if (k / SIZES.len() + i).is_multiple_of(2) { size } else { -size });
-            }
-            self.keeps([x, parameters, times], c)
+            let at = if self.fixed.is_none() { self.sized(k) } else { self.at(k) };
+            self.keeps(at, c)
         })
+    }
+
+    /// Sample point k with states of one of the [`SIZES`] and of both signs.
+    fn sized(&self, k: usize) -> [Vec<f64>; 3] {
+        let [mut x, parameters, times] = self.at(k);
+        let (size, turn) = (SIZES[k % SIZES.len()], k / SIZES.len());
+        x.iter_mut().enumerate().for_each(|(i, x)| *x *= if (turn + i).is_multiple_of(2) { size } else { -size });
+        [x, parameters, times]
     }
 
     /// True if c·f vanishes at a point, or f is undefined there.
@@ -362,6 +364,15 @@ mod tests {
     fn terms_that_switch_on_at_large_states_are_seen() {
         let m = model(&[("x", "k - x"), ("y", "max(0, x - 5) - max(0, y - 40)")], &["k"]);
         assert!(conserved(&m).is_empty());
+    }
+
+    /// A term that is zero to rounding while states are of order 1, and of order 1 where they are small.
+    #[test]
+    fn terms_that_vanish_except_at_small_states_are_seen() {
+        let m = model(&[("x", "y - x"), ("y", "k*exp(-x^2/1e-8) - k*exp(-y^2/1e-8)/2")], &["k"]);
+        assert!(conserved(&m).is_empty());
+        let m = model(&[("x", "exp(-x^2/1e-8)*k")], &["k"]);
+        assert!(shifts(&m).is_empty() && conserved(&m).is_empty());
     }
 
     #[test]

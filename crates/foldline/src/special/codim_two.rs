@@ -207,6 +207,10 @@ impl Monitor for CodimensionTwo<'_> {
         self.kind
     }
 
+    fn is_oriented(&self) -> bool {
+        matches!(self.kind, Kind::Cusp | Kind::BogdanovTakens) && self.held != Kind::Hopf
+    }
+
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         self.tested(reference, at).unwrap_or(f64::NAN)
     }
