@@ -1,6 +1,6 @@
 //! Stroboscopic and Poincaré points over a parameter: of the solutions on branches, and of motions found by simulation.
 
-use crate::branches::{LIGHTER, root};
+use crate::branches::{THINNER, root};
 use crate::curve::line_of;
 use crate::figure::{Layer, Marker, Shape};
 use crate::palette::nth;
@@ -33,7 +33,7 @@ pub fn branch_layers(diagram: &Diagram, model: &Model, x: Quantity, channel: usi
         let (own, depth) = root(diagram, branch);
         let colour = nth(roots.iter().position(|name| *name == own.name).unwrap_or(0));
         let named =
-            |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.faint(0.65).named(LIGHTER) };
+            |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.wide(1.1).named(THINNER) };
         let values = |point: &Point| match plane {
             Plane::Stroboscopic => stroboscopic(model, point),
             Plane::Level(of, level) => crossings(model, point, of, level),
