@@ -75,7 +75,7 @@ fn lines(
 /// Layers of clouds, in colours after `taken` others: small dots behind the branches.
 pub fn cloud_layers(clouds: &[Cloud], taken: usize) -> Vec<Layer> {
     let layer = |(k, cloud): (usize, &Cloud)| {
-        Layer::scatter(cloud.points.clone(), Marker::Dot, nth(taken + k)).wide(0.7).faint(0.6).named(cloud.name.clone())
+        Layer::scatter(cloud.points.clone(), Marker::Dot, nth(taken + k)).wide(0.7).named(cloud.name.clone())
     };
     clouds.iter().enumerate().map(layer).filter(|layer| !layer.is_empty()).collect()
 }
