@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ._model import Model
 
 #: Distinguishable with all common types of colour vision (Okabe and Ito), as in the pictures of the command line.
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c68500", "#2f9bd8", "#000000", "#8c8400")
 #: Markers of matplotlib for the shapes that the command line draws.
 MARKS = {
     "circle": "o",

@@ -144,6 +144,22 @@ class Basins:
         Returns
         -------
         matplotlib axes
+
+        Raises
+        ------
+        InputError
+            If no plane was computed.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> box = dict(range=(-2, 2))
+        >>> model = foldline.model(equations={"x": "v", "v": "x - x^3 - 0.5*v"}, states={"x": box, "v": box})
+        >>> axes = foldline.basins(model, samples=0, plane=("x", "v"), cells=16).plot()
+        >>> axes.get_xlabel(), axes.get_ylabel()
+        ('x', 'v')
         """
         from matplotlib.colors import ListedColormap
         from matplotlib.patches import Patch

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _native
 from ._arguments import suggestion
-from ._arrays import Complexes, Floats, Integers, complexes, floats, integers
+from ._arrays import Complexes, Floats, Integers, complexes, floats, integers, whole
 from ._sensitivity import Band, Sensitivity, bands, spreads
 from ._solution import Solution
 
@@ -127,6 +127,13 @@ class SpecialPoint(Solution):
         dict
             `Band` by the name of the number.
 
+        Raises
+        ------
+        ArgumentError
+            If a parameter is unknown, or its value is no uncertainty.
+        InputError
+            If `samples` is not a positive whole number.
+
         Examples
         --------
         >>> import foldline
@@ -138,7 +145,7 @@ class SpecialPoint(Solution):
         """
         diagram = self.branch.diagram
         given = spreads(diagram.model, parameters)
-        return bands(*diagram._native.uncertainty(self.branch._index, self._index, given, samples))
+        return bands(*diagram._native.uncertainty(self.branch._index, self._index, given, whole("samples", samples)))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _special_of, (self.branch, self._index)
@@ -201,6 +208,19 @@ class SpecialPoints(Sequence[SpecialPoint]):
         -------
         pandas.DataFrame
             Quantities are in the units of the model.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> branch.special.to_pandas()["kind"].tolist()
+        ['fold']
         """
         from ._tables import special_frame
 
@@ -405,6 +425,11 @@ class Branch(Sequence[Solution]):
             `Sensitivity` by the name of the number: ``"period"``, or a state or output followed by ``_min`` or ``_max``. The
             continuation parameter is one of the parameters; each changes while the others stay.
 
+        Raises
+        ------
+        IndexError
+            If the branch has no such point.
+
         Examples
         --------
         >>> import foldline
@@ -524,6 +549,15 @@ class Branch(Sequence[Solution]):
         ------
         InputError
             If a quantity or unit is unknown.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> artists = branch.plot(y="x_max", color="black")
+        >>> artists[0].axes.get_xlabel()
+        'μ'
         """
         from ._plot import branch
 
@@ -545,6 +579,21 @@ class Branch(Sequence[Solution]):
         Returns
         -------
         plotly.graph_objects.Figure
+
+        Raises
+        ------
+        ImportError
+            If plotly is not installed.
+        InputError
+            If a quantity is unknown, or there is nothing to draw.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> branch.plotly(y="x_max").layout.xaxis.title.text
+        'μ'
         """
         from ._plotly import figure
 
@@ -561,6 +610,22 @@ class Branch(Sequence[Solution]):
         Returns
         -------
         pandas.DataFrame
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        InputError
+            If a unit is unknown, or the quantity has none in the model.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> table = branch.to_pandas()
+        >>> len(table) == len(branch), bool(table["mu"].min() >= -1)
+        (True, True)
         """
         from ._tables import branches_frame
 
@@ -572,6 +637,19 @@ class Branch(Sequence[Solution]):
         Returns
         -------
         xarray.Dataset
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> dict(branch.to_xarray().sizes)["point"] == len(branch)
+        True
         """
         from ._tables import branches_dataset
 
@@ -584,6 +662,22 @@ class Branch(Sequence[Solution]):
         ----------
         folder : path
             As for `Diagram.save`.
+
+        Raises
+        ------
+        RunFileError
+            If the folder holds a run already or cannot be written to.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> import os, tempfile
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> folder = os.path.join(tempfile.mkdtemp(), "run")
+        >>> branch.save(folder)
+        >>> foldline.open(folder)[0].name
+        'equilibrium over mu'
         """
         self.diagram.save(folder)
 

@@ -69,6 +69,11 @@ class Case:
         -------
         Solution
 
+        Raises
+        ------
+        ArgumentError, InputError, NoSolution
+            As for `Model.settle`.
+
         Examples
         --------
         >>> import foldline
@@ -93,6 +98,11 @@ class Case:
         -------
         Attractors
 
+        Raises
+        ------
+        ArgumentError, InputError
+            As for `Model.attractors`.
+
         Examples
         --------
         >>> import foldline
@@ -113,6 +123,11 @@ class Case:
         Returns
         -------
         Basins
+
+        Raises
+        ------
+        ArgumentError, InputError
+            As for `foldline.basins`.
 
         Examples
         --------
@@ -140,6 +155,11 @@ class Case:
         -------
         Trajectory
 
+        Raises
+        ------
+        ArgumentError, InputError
+            As for `Model.simulate`.
+
         Examples
         --------
         >>> import foldline
@@ -166,6 +186,11 @@ class Case:
         Returns
         -------
         Branch
+
+        Raises
+        ------
+        ArgumentError, InputError, NoSolution
+            As for `foldline.follow`.
 
         Examples
         --------
@@ -202,6 +227,11 @@ class Case:
         Returns
         -------
         Diagram
+
+        Raises
+        ------
+        InputError
+            As for `foldline.run`.
 
         Examples
         --------

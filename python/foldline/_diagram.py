@@ -176,6 +176,15 @@ class Diagram:
         ------
         InputError
             If a quantity or unit is unknown, or there is nothing to draw.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> artists = branch.diagram.plot(y="x_max")
+        >>> artists[0].axes.get_xlabel()
+        'μ'
         """
         from ._plot import diagram
 
@@ -197,6 +206,21 @@ class Diagram:
         Returns
         -------
         plotly.graph_objects.Figure
+
+        Raises
+        ------
+        ImportError
+            If plotly is not installed.
+        InputError
+            If a quantity is unknown, or there is nothing to draw.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> branch.diagram.plotly(y="x_max").layout.xaxis.title.text
+        'μ'
         """
         from ._plotly import figure
 
@@ -215,6 +239,21 @@ class Diagram:
         -------
         pandas.DataFrame
             Special points are in ``diagram.special.to_pandas()``, surveys and sweeps in ``diagram.responses[name].to_pandas()``.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        InputError
+            If a unit is unknown, or the quantity has none in the model.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> branch.diagram.to_pandas()["branch"].unique().tolist()
+        ['equilibrium over mu']
         """
         from ._tables import branches_frame
 
@@ -226,6 +265,19 @@ class Diagram:
         Returns
         -------
         xarray.Dataset
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> branch.diagram.to_xarray().sizes["point"] == len(branch)
+        True
         """
         from ._tables import branches_dataset
 
@@ -243,6 +295,17 @@ class Diagram:
         ------
         RunFileError
             If the folder holds a run already or cannot be written to.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> import os, tempfile
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+        >>> folder = os.path.join(tempfile.mkdtemp(), "run")
+        >>> branch.diagram.save(folder)
+        >>> len(foldline.open(folder).special)
+        1
         """
         self._native.save(os.fspath(folder))
 

@@ -78,6 +78,21 @@ class Model:
         ----------
         path : path
             Path of the file. An existing file is replaced.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> import os, tempfile
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+        >>> path = os.path.join(tempfile.mkdtemp(), "fold.toml")
+        >>> model.save(path)
+        >>> list(foldline.model(path).parameters)
+        ['mu']
         """
         Path(path).write_text(self.text, encoding="utf-8")
 

@@ -110,7 +110,7 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, s
         root = _root(own, branch.name)
         colour = COLOURS[roots.index(root) % len(COLOURS)]
         main = branch.name == root
-        style = {"color": colour, "linewidth": 1.8 if main else 1.2, "alpha": 1 if main else 0.65}
+        style = {"color": colour, "linewidth": 1.8 if main else 1.2}
         artists += _lines(axes, branch, across, up, scale, {**style, "label": branch.name if main else "_"})
     named: set[str] = set()
     for branch in shown:
@@ -192,9 +192,9 @@ def _multipliers(axes: Any, own: Solution) -> list[Any]:
     artists: list[Any] = []
     if own.is_cycle:
         angle = np.linspace(0, 2 * np.pi, 361)
-        artists += axes.plot(np.cos(angle), np.sin(angle), color="#9a9a9a", linewidth=1)
+        artists += axes.plot(np.cos(angle), np.sin(angle), color="#8f8f8f", linewidth=1)
     else:
-        artists.append(axes.axvline(0, color="#9a9a9a", linewidth=1))
+        artists.append(axes.axvline(0, color="#8f8f8f", linewidth=1))
     values = own.spectrum
     # The trivial multiplier, 1 up to rounding, comes first if there is one.
     trivial = 1 if own.is_cycle and not own.forcing_periods else 0

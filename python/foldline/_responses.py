@@ -45,6 +45,14 @@ class Responses(Mapping[str, Any]):
         Name of the parameter that varies.
     diagram : Diagram
         Diagram to which it belongs; ``diagram.save(folder)`` stores it.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "h + x - x^3"}, parameters={"h": -1.0})
+    >>> found = foldline.sweep(model.settle([-1.3]), "h", (-1, 1), 3)
+    >>> found["h"].tolist(), found["x_max"].round(4).tolist()
+    ([-1.0, 0.0, 1.0], [-1.3247, -1.0, 1.3247])
     """
 
     def __init__(self, diagram: Diagram, parts: Mapping[str, Any]) -> None:
@@ -107,6 +115,18 @@ class Responses(Mapping[str, Any]):
         -------
         pandas.DataFrame
             Quantities are in the units of the model. Periods of motions that do not repeat, and ranges of motions that escaped, are NaN.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "h + x - x^3"}, parameters={"h": -1.0})
+        >>> foldline.sweep(model.settle([-1.3]), "h", (-1, 1), 9).to_pandas()["h"].tolist()
+        [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0]
         """
         from ._tables import responses_frame
 
@@ -127,6 +147,21 @@ class Responses(Mapping[str, Any]):
         Returns
         -------
         list of matplotlib artists
+
+        Raises
+        ------
+        InputError
+            If a quantity is unknown.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "h + x - x^3"}, parameters={"h": -1.0})
+        >>> artists = foldline.sweep(model.settle([-1.3]), "h", (-1, 1), 9).plot()
+        >>> artists[0].axes.get_xlabel()
+        'h'
         """
         from ._overlay import responses
 
@@ -238,6 +273,14 @@ class Survey(Responses):
         -------
         dict of arrays, shape (motions,)
             The columns; motions are ordered as in the table, the most frequent first.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "h + x - x^3"}, states={"x": dict(range=(-2, 2))}, parameters={"h": 0.0})
+        >>> found = foldline.survey(model, "h", (-1, 1), 3, starts=16)
+        >>> sorted(found.at(0.1)["x_max"].round(4).tolist())
+        [-1.0, 1.0]
         """
         nearest = self.value[np.argmin(np.abs(self.value - value))] if len(self.value) else np.nan
         chosen = self.value == nearest

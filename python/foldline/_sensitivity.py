@@ -101,6 +101,11 @@ class Sensitivity(Mapping[str, Derivative]):
         float
             NaN if the number is 0.
 
+        Raises
+        ------
+        KeyError
+            If the model has no such parameter.
+
         Examples
         --------
         >>> import foldline
@@ -118,6 +123,19 @@ class Sensitivity(Mapping[str, Derivative]):
         -------
         pandas.DataFrame
             Indexed by the names of the parameters.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a - c*x^2"}, parameters={"a": 1.0, "c": 2.0})
+        >>> rest = foldline.follow(model.settle([0.5]), "a", (0.5, 2))
+        >>> rest.sensitivities(0)["x_max"].to_pandas()["elasticity"].round(6).tolist()
+        [0.5, -0.5]
         """
         import pandas
 
@@ -138,6 +156,22 @@ class Sensitivity(Mapping[str, Derivative]):
         -------
         matplotlib.axes.Axes
             The axes.
+
+        Raises
+        ------
+        ArgumentError
+            If the model has no such parameter.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a - c*x^2"}, parameters={"a": 1.0, "c": 2.0})
+        >>> rest = foldline.follow(model.settle([0.5]), "a", (0.5, 2))
+        >>> axes = rest.sensitivities(0)["x_max"].plot({"a": 0.1})
+        >>> [label.get_text() for label in axes.get_yticklabels()]
+        ['c ± 0.02', 'a ± 0.1']
         """
         given = dict(changes or {})
         unknown = [name for name in given if name not in self._model.parameters]

@@ -69,6 +69,18 @@ class Trajectory:
         -------
         pandas.DataFrame
             Columns `t`, every state and every output, in the units of the model.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "-a*x"}, parameters={"a": 1.0})
+        >>> list(model.simulate([1.0], 1.0).to_pandas())
+        ['t', 'x']
         """
         from ._tables import trajectory_frame
 
@@ -80,6 +92,18 @@ class Trajectory:
         Returns
         -------
         xarray.Dataset
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "-a*x"}, parameters={"a": 1.0})
+        >>> list(model.simulate([1.0], 1.0).to_xarray().sizes)
+        ['t']
         """
         from ._tables import trajectory_dataset
 
@@ -98,6 +122,20 @@ class Trajectory:
         Returns
         -------
         list of matplotlib lines
+
+        Raises
+        ------
+        KeyError
+            If there is no such state or output.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "-a*x"}, parameters={"a": 1.0})
+        >>> len(model.simulate([1.0], 1.0).plot())
+        1
         """
         from ._axes import axes_or_new
 

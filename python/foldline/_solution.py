@@ -165,6 +165,11 @@ class Solution:
         dict of arrays, shape (count,)
             `t`, every state and every output, in the units of the model. For an equilibrium the arrays are empty.
 
+        Raises
+        ------
+        InputError
+            If `count` is not a positive whole number, or the profile of the cycle was not stored.
+
         Examples
         --------
         >>> import foldline
@@ -196,6 +201,20 @@ class Solution:
             Frequencies in cycles per time unit of the model; empty if the model names no whirl.
         amplitudes : complex array, shape (count,)
             Amplitudes in the unit of the states u and v.
+
+        Raises
+        ------
+        InputError
+            If `count` is not a positive whole number, or the profile of the cycle was not stored.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x", "y": "sin(w*t) - y"}, parameters={"w": 1.0}, frequency="w", whirl="x y")
+        >>> frequencies, amplitudes = model.settle("cycle").signed_spectrum(8)
+        >>> largest = abs(amplitudes).argmax()
+        >>> round(float(6.28318531*frequencies[largest]), 6), round(float(abs(amplitudes[largest])), 6)
+        (1.0, 0.707107)
         """
         count = whole("count", count)
         self._check_stored()
@@ -223,6 +242,18 @@ class Solution:
         -------
         pandas.DataFrame
             Columns `t`, every state and every output, in the units of the model.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> list(model.settle("cycle").to_pandas())
+        ['t', 'x']
         """
         from ._tables import solution_frame
 
@@ -234,6 +265,18 @@ class Solution:
         Returns
         -------
         xarray.Dataset
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> list(model.settle("cycle").to_xarray().sizes)
+        ['t']
         """
         from ._tables import solution_dataset
 
@@ -253,6 +296,20 @@ class Solution:
         -------
         dict
             Artists of the panels `orbit`, `series`, `spectrum` (if the model names a whirl) and `multipliers`.
+
+        Raises
+        ------
+        InputError
+            If there are not as many axes as panels, or the profile of the cycle was not stored.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> list(model.settle("cycle").plot())
+        ['orbit', 'series', 'multipliers']
         """
         from ._plot import solution
 
@@ -368,6 +425,18 @@ class Attractors(Sequence[Attractor]):
         -------
         pandas.DataFrame
             `family`, `ratio`, `hits`, `share` with its confidence interval, `period`, and the extremes of every state and output.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "h + x - x^3"}, states={"x": dict(range=(-2, 2))}, parameters={"h": 0.0})
+        >>> model.attractors(samples=16).to_pandas()["family"].tolist()
+        ['equilibrium', 'equilibrium']
         """
         from ._tables import attractors_frame
 

@@ -76,6 +76,18 @@ class Strobe:
         -------
         pandas.DataFrame
             The parameter, the number of the recorded period, every state and every output, in the units of the model.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> len(foldline.strobe(model, "w", (1, 2), 3, periods=4, transient=10).to_pandas())
+        12
         """
         from ._tables import strobe_frame
 
@@ -96,6 +108,21 @@ class Strobe:
         Returns
         -------
         list of matplotlib artists
+
+        Raises
+        ------
+        InputError
+            If there is no such state or output.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> artists = foldline.strobe(model, "w", (1, 2), 3, periods=4, transient=10).plot()
+        >>> artists[0].axes.get_xlabel()
+        'w'
         """
         from ._overlay import strobe
 

@@ -117,6 +117,19 @@ class Uncertainty(Sequence[Spread]):
         -------
         pandas.DataFrame
             Values are in the unit of the parameter `free`.
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a + b*x - x^3"}, parameters={"a": -2.0, "b": 3.0})
+        >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
+        >>> foldline.uncertainty(branch, {"b": 0.01}, samples=20).to_pandas()["value"].round(6).tolist()
+        [2.0, -2.0]
         """
         from ._tables import _pandas
 
@@ -140,6 +153,22 @@ class Uncertainty(Sequence[Spread]):
         Returns
         -------
         list of matplotlib artists
+
+        Raises
+        ------
+        InputError
+            If the samples have no such quantity.
+        ImportError
+            If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "a + b*x - x^3"}, parameters={"a": -2.0, "b": 3.0})
+        >>> branch = foldline.follow(model.settle([-2.0]), "a", (-2.5, 2.5))
+        >>> artists = foldline.uncertainty(branch, {"b": 0.01}, samples=20).plot()
+        >>> artists[0].axes.get_xlabel()
+        'a'
         """
         from ._axes import COLOURS, axes_or_new
 

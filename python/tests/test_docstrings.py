@@ -1,18 +1,16 @@
 """Public names are documented in one style, and their examples run."""
 
 import doctest
-import importlib
 import inspect
-import pkgutil
 
 import pytest
+from matplotlib import pyplot
 
 import foldline
 
 PUBLIC = [getattr(foldline, name) for name in foldline.__all__]
-MODULES = ["foldline", *(f"foldline.{own.name}" for own in pkgutil.iter_modules(foldline.__path__) if own.name != "_native")]
-#: Names that need no example: methods that draw, convert or store, whose examples would show nothing.
-QUIET = ("plot", "plotly", "to_pandas", "to_xarray", "save", "signed_spectrum", "at")
+#: Functions without errors of their own.
+HARMLESS = ("Basins.part", "Basins.share", "Survey.at", "rescued", "where")
 
 
 def members():
@@ -24,13 +22,19 @@ def members():
                     yield f"{own.__name__}.{name}", part
 
 
-@pytest.mark.parametrize("name", MODULES)
+EXAMPLES = {name: inspect.getdoc(own) or "" for name, own in [("foldline", foldline), *members()]}
+#: Compared as the book is: white space may differ, and an ellipsis stands for numbers that depend on the processor.
+FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+# doctest.testmod passes over methods of classes whose module was renamed to that from which they are imported.
+@pytest.mark.parametrize("name", [name for name, text in EXAMPLES.items() if ">>>" in text])
 def test_examples_run(name):
-    module = importlib.import_module(name)
-    found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
-    assert found.failed == 0
-    if name in ("foldline", "foldline._compute", "foldline._model", "foldline._sweeps"):
-        assert found.attempted > 2
+    test = doctest.DocTestParser().get_doctest(EXAMPLES[name], {}, name, None, None)
+    result = doctest.DocTestRunner(optionflags=FLAGS).run(test)
+    pyplot.close("all")
+    assert result.attempted > 1
+    assert result.failed == 0
 
 
 def test_everything_public_is_documented():
@@ -38,19 +42,20 @@ def test_everything_public_is_documented():
     assert not missing
 
 
-def test_docstrings_have_parameters_returns_and_examples():
+def test_docstrings_have_parameters_returns_errors_and_examples():
     wrong = []
     for name, part in members():
         if not inspect.isfunction(part):
             continue
-        text, last = inspect.getdoc(part) or "", name.rsplit(".", 1)[-1]
+        text = inspect.getdoc(part) or ""
         taken = [own for own in inspect.signature(part).parameters if own != "self"]
         section = text.partition("Parameters\n----------\n")[2].partition("\n\n")[0] if taken else ""
         documented = text.partition("Parameters\n----------\n")[2]
         lines = [line.split(" : ")[0].lstrip("*") for line in documented.splitlines() if line and not line.startswith(" ")]
         named = {word.strip() for line in lines for word in line.split(",")}
         wrong += [f"{name}: {own}" for own in taken if own not in named]
-        wrong += [f"{name}: Examples"] if ">>>" not in text and last not in QUIET else []
+        wrong += [f"{name}: Examples"] if ">>>" not in text else []
+        wrong += [f"{name}: Raises"] if "Raises\n------" not in text and name not in HARMLESS else []
         returns = inspect.signature(part).return_annotation not in ("None", None)
         wrong += [f"{name}: Returns"] if returns and "Returns\n-------" not in text else []
         assert section or not taken, name
@@ -60,4 +65,4 @@ def test_docstrings_have_parameters_returns_and_examples():
 def test_classes_have_an_example_or_are_exceptions():
     without = [own.__name__ for own in PUBLIC if inspect.isclass(own) and ">>>" not in (own.__doc__ or "")]
     kinds = (BaseException,)
-    assert [name for name in without if not issubclass(getattr(foldline, name), kinds)] == ["Responses"]
+    assert [name for name in without if not issubclass(getattr(foldline, name), kinds)] == []

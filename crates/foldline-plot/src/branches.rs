@@ -50,7 +50,7 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
 }
 
 /// Layers of all branches, marks above curves. Each branch that was not switched to has a colour; the others have the
-/// colour of the branch they come from, thinner and lighter.
+/// colour of the branch they come from, thinner.
 pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
     let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
     let (mut curves, mut specials) = (Vec::new(), Vec::new());
@@ -61,13 +61,13 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
         curve = match depth {
             0 if index < MOST => curve.named(shortened(&branch.name)).wide(2.0),
             0 => curve.wide(2.0),
-            _ => curve.named(LIGHTER).wide(1.4).faint(0.65),
+            _ => curve.named(THINNER).wide(1.2),
         };
         curves.push(curve);
         specials.extend(special_layers(branch, x, y, nth(index)));
     }
     // The entry for branches that branch off goes last.
-    curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
+    curves.sort_by_key(|layer| layer.name.as_deref() == Some(THINNER));
     curves.into_iter().chain(specials).collect()
 }
 
@@ -125,7 +125,7 @@ pub fn root_count(diagram: &Diagram) -> usize {
 const MARK: f64 = 2.6;
 
 /// Legend entry of branches that start at a special point of another branch.
-pub(crate) const LIGHTER: &str = "branching off";
+pub(crate) const THINNER: &str = "branching off";
 
 /// Maximum number of branches in the legend.
 const MOST: usize = 14;

@@ -5,7 +5,7 @@
 //! is SVG; PNG and PDF are made from it with the embedded font, so they look alike everywhere.
 //!
 //! Stable pieces are solid and unstable ones dashed; the change lies exactly at the special point. A branch that starts
-//! at a special point of another branch has the colour of that branch, but lighter.
+//! at a special point of another branch has the colour of that branch, but is thinner.
 
 pub mod basins;
 pub mod branches;

@@ -151,7 +151,7 @@ pub fn space_panel(diagram: &Diagram, model: &Model, picture: &Picture, z: Quant
         let (own, depth) = root(diagram, branch);
         let colour = nth(names.iter().position(|name| *name == own.name).unwrap_or(0));
         let curve = space.curve(&line_of(branch, place), colour);
-        let curve = if depth == 0 { curve.named(branch.name.clone()).wide(2.0) } else { curve.wide(1.3).faint(0.7) };
+        let curve = if depth == 0 { curve.named(branch.name.clone()).wide(2.0) } else { curve.wide(1.2) };
         panel.layers.push(curve);
         for (kind, known, at) in marks_of(branch, place) {
             let mark = Layer::scatter(vec![space.project(at)], Marker::of(kind), colour).wide(3.0);

@@ -3,6 +3,7 @@
 use crate::curve::cut;
 use crate::figure::{Layer, Marker, Shape, Zoom};
 use crate::frame::Frame;
+use crate::palette::ink;
 use crate::scale::SIZE;
 use crate::texts::{Area, Occupied, escaped};
 use std::fmt::Write;
@@ -65,7 +66,7 @@ impl<'f> Painter<'f> {
             Shape::Label { places, text } => {
                 let seen = places.iter().map(|at| self.frame.units(*at)).filter(|at| self.frame.holds(*at));
                 let anchors = seen.map(|at| self.frame.at(at)).collect();
-                self.optional.push((anchors, text.clone(), layer.colour));
+                self.optional.push((anchors, text.clone(), ink(layer.colour)));
             }
             Shape::Text { at, text } => {
                 let at = self.frame.units(*at);
@@ -75,7 +76,7 @@ impl<'f> Painter<'f> {
                         self.marks,
                         "<text x=\"{x:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-size=\"{NOTE}\" fill=\"{}\">{}</text>",
                         y + 0.36 * NOTE,
-                        layer.colour,
+                        ink(layer.colour),
                         escaped(text)
                     );
                 }
@@ -83,7 +84,7 @@ impl<'f> Painter<'f> {
             Shape::Note { at, text } => {
                 let at = self.frame.units(*at);
                 if self.frame.holds(at) {
-                    self.waiting.push((self.frame.at(at), text.clone(), layer.colour, 5.0));
+                    self.waiting.push((self.frame.at(at), text.clone(), ink(layer.colour), 5.0));
                 }
             }
         }
@@ -173,7 +174,7 @@ impl<'f> Painter<'f> {
                 let at = self.frame.at(top);
                 mark(&mut self.marks, Marker::Dot, at, &Layer { width: 2.2, ..layer.clone() }, true);
                 if let Some(text) = labels.get(k).filter(|t| !t.is_empty()) {
-                    self.waiting.push((at, text.clone(), layer.colour, 5.0));
+                    self.waiting.push((at, text.clone(), ink(layer.colour), 5.0));
                 }
             }
         }

@@ -46,7 +46,7 @@ fn iterate_layers(set: &Responses, x: Quantity, state: usize, colour: &'static s
         all.flatten().map(|(x, y)| [x, y]).collect()
     };
     let places: Vec<[f64; 2]> = set.responses.iter().flat_map(of).collect();
-    let layer = Layer::scatter(places, Marker::Dot, colour).wide(0.5).faint(0.5).named(set.name.clone());
+    let layer = Layer::scatter(places, Marker::Dot, colour).wide(0.5).named(set.name.clone());
     if layer.is_empty() { Vec::new() } else { vec![layer] }
 }
 

@@ -1,6 +1,6 @@
 //! Stroboscopic and Poincaré points over a parameter: of the solutions on branches, and of motions found by simulation.
 
-use crate::branches::{LIGHTER, root};
+use crate::branches::{THINNER, root};
 use crate::curve::line_of;
 use crate::figure::{Layer, Marker, Shape};
 use crate::palette::nth;
@@ -33,7 +33,7 @@ pub fn branch_layers(diagram: &Diagram, model: &Model, x: Quantity, channel: usi
         let (own, depth) = root(diagram, branch);
         let colour = nth(roots.iter().position(|name| *name == own.name).unwrap_or(0));
         let named =
-            |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.faint(0.65).named(LIGHTER) };
+            |layer: Layer| if depth == 0 { layer.named(branch.name.clone()) } else { layer.wide(1.1).named(THINNER) };
         let values = |point: &Point| match plane {
             Plane::Stroboscopic => stroboscopic(model, point),
             Plane::Level(of, level) => crossings(model, point, of, level),
@@ -75,7 +75,7 @@ fn lines(
 /// Layers of clouds, in colours after `taken` others: small dots behind the branches.
 pub fn cloud_layers(clouds: &[Cloud], taken: usize) -> Vec<Layer> {
     let layer = |(k, cloud): (usize, &Cloud)| {
-        Layer::scatter(cloud.points.clone(), Marker::Dot, nth(taken + k)).wide(0.7).faint(0.6).named(cloud.name.clone())
+        Layer::scatter(cloud.points.clone(), Marker::Dot, nth(taken + k)).wide(0.7).named(cloud.name.clone())
     };
     clouds.iter().enumerate().map(layer).filter(|layer| !layer.is_empty()).collect()
 }

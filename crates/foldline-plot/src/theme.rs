@@ -35,7 +35,7 @@ const GROUND: &str = "#14181d";
 
 /// Colours of the light theme with those that replace them in the dark one. Each curve colour has a contrast of at least
 /// 4.5 with [`GROUND`].
-const DARK: [(&str, &str); 20] = [
+const DARK: [(&str, &str); 28] = [
     ("#fff", GROUND),
     ("#ffffff", GROUND),
     ("#222", "#e8ebee"),
@@ -45,7 +45,7 @@ const DARK: [(&str, &str); 20] = [
     ("#666", "#a6b0ba"),
     ("#ccc", "#3c454e"),
     ("#e8e8e8", "#293038"),
-    ("#9a9a9a", "#7d8791"),
+    ("#8f8f8f", "#7d8791"),
     ("#c8c8c8", "#3c454e"),
     ("#000000", "#f4f6f8"),
     ("#0072b2", "#4aa8e0"),
@@ -56,6 +56,14 @@ const DARK: [(&str, &str); 20] = [
     ("#56b4e9", "#86cdf2"),
     ("#8c8400", "#d8cf4a"),
     ("#f0e442", "#f0e442"),
+    ("#c68500", "#e9ae33"),
+    ("#2f9bd8", "#86cdf2"),
+    ("#b45000", "#f08043"),
+    ("#007d5b", "#2fc298"),
+    ("#a5578b", "#dd94bd"),
+    ("#8a6000", "#e9ae33"),
+    ("#1b77ab", "#86cdf2"),
+    ("#736c00", "#d8cf4a"),
 ];
 
 /// Returns a finished picture in the colours of the theme. For [`Theme::Print`] see [`black`], which comes before.
@@ -111,24 +119,14 @@ fn blacken(layer: &mut Layer) {
 mod tests {
     use super::*;
     use crate::figure::{Axis, Panel};
-    use crate::palette::nth;
-
-    /// Relative luminance of a colour `#rrggbb` (Web Content Accessibility Guidelines 2.2).
-    fn luminance(colour: &str) -> f64 {
-        let part = |k: usize| {
-            let value = f64::from(u8::from_str_radix(&colour[k..k + 2], 16).expect("a colour")) / 255.0;
-            if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-        };
-        0.2126 * part(1) + 0.7152 * part(3) + 0.0722 * part(5)
-    }
+    use crate::palette::{contrast, ink, nth};
 
     #[test]
     fn colours_of_curves_are_legible_on_the_dark_ground() {
-        for k in 0..8 {
-            let svg = themed(format!("<path stroke=\"{}\"/>", nth(k)), Theme::Dark);
+        for colour in (0..8).map(nth).chain((0..8).map(|k| ink(nth(k)))).chain([GREY, PALE]) {
+            let svg = themed(format!("<path stroke=\"{colour}\"/>"), Theme::Dark);
             let new = &svg[svg.find('#').expect("a colour")..][..7];
-            let contrast = (luminance(new) + 0.05) / (luminance(GROUND) + 0.05);
-            assert!(contrast >= 4.5, "{new}: {contrast}");
+            assert!(contrast(new, GROUND) >= 4.5, "{colour} becomes {new}: {}", contrast(new, GROUND));
         }
     }
 

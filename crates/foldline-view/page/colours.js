@@ -1,24 +1,24 @@
 // Colours of the theme, of branches, and shapes and colours of the kinds of special points (Okabe and Ito's palette).
 
-const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b8528f", "#c98800", "#2f9bd8", "#444c55", "#8c8400"];
+const LIGHT = ["#0072b2", "#d55e00", "#009e73", "#b8528f", "#c68500", "#2f9bd8", "#444c55", "#8c8400"];
 const DARK = ["#4aa8e0", "#f08043", "#2fc298", "#dd94bd", "#e9ae33", "#86cdf2", "#c3ccd5", "#e6da4e"];
 
 /** Shape, index of the colour, and short name of each kind of special point. */
 const KINDS = {
   "fold": ["circle", "#d55e00", "F"],
   "branch-point": ["square", "#cc79a7", "BP"],
-  "hopf": ["diamond", "#e69f00", "H"],
+  "hopf": ["diamond", "#c68500", "H"],
   "period-doubling": ["up", "#009e73", "PD"],
-  "torus": ["star", "#56b4e9", "T"],
+  "torus": ["star", "#2f9bd8", "T"],
   "grazing": ["cross", "#7a5cc0", "G"],
   "boundary-equilibrium": ["plus", "#7a5cc0", "BE"],
   sliding: ["cross", "#a0522d", "SL"],
   "impact-grazing": ["diamond", "#7a5cc0", "IG"],
   "mark": ["ring", "#808890", "M"],
-  "peak": ["ring", "#303840", "P"],
-  "unexplained": ["down", "#c00000", "?"],
+  "peak": ["ring", "#6b7580", "P"],
+  "unexplained": ["down", "#d02020", "?"],
   "cusp": ["down", "#cc79a7", "CP"],
-  "bogdanov-takens": ["pentagon", "#e69f00", "BT"],
+  "bogdanov-takens": ["pentagon", "#c68500", "BT"],
   "zero-hopf": ["pentagon", "#0072b2", "ZH"],
   "generalised-hopf": ["pentagon", "#009e73", "GH"],
   "double-hopf": ["pentagon", "#cc79a7", "HH"],

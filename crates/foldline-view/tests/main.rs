@@ -2,6 +2,7 @@
 //! processors.
 
 mod common;
+mod contrast;
 mod growth;
 mod orders;
 mod security;

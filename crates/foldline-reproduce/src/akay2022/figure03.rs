@@ -5,7 +5,7 @@ use super::sharpness::{Choice, Comparison, PUBLISHED, choice};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::Runs;
-use foldline_plot::palette::{BLUE, GREY, ORANGE, PURPLE};
+use foldline_plot::palette::{AMBER, BLUE, GREY, PURPLE};
 use foldline_plot::{Axis, Figure, Layer, Marker, Panel};
 use foldline_rotor::ContactLaw;
 use std::fmt::Write;
@@ -14,7 +14,7 @@ pub const PLAN: FigurePlan =
     FigurePlan { name: "3", title: "the smoothed contact law and the choice of K", runs: &["diagrams"], make };
 
 /// β and K: the reference, the softer ring as validated, and the softer ring with an insufficient sharpness.
-const LAWS: [(f64, f64, &str); 3] = [(10.0, 150.0, BLUE), (6.0, 90.0, PURPLE), (6.0, 30.0, ORANGE)];
+const LAWS: [(f64, f64, &str); 3] = [(10.0, 150.0, BLUE), (6.0, 90.0, PURPLE), (6.0, 30.0, AMBER)];
 
 fn make(runs: &Runs) -> Result<Made, String> {
     let choice = choice(runs, runs.run("diagrams")?)?;

@@ -5,7 +5,7 @@ use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Kind, Point};
-use foldline_plot::palette::{BLUE, GREEN, GREY, ORANGE, SKY, VERMILION};
+use foldline_plot::palette::{AMBER, AZURE, BLUE, GREEN, GREY, VERMILION};
 use foldline_plot::{Axis, Figure, Layer, Marker, Panel, Quantity, branch_curve};
 
 pub const PLAN: FigurePlan = FigurePlan {
@@ -46,7 +46,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
 fn over_kappa(flows: &Run) -> Result<Panel, String> {
     let axes = (Axis::new("κ").from(-0.03, 1.03), Axis::new("max r"));
     let mut panel = Panel::new("(a)", "κ runs from cubic to contact", axes.0, axes.1);
-    for (family, direct, aside) in [("SL", VERMILION, ORANGE), ("DL", GREEN, BLUE)] {
+    for (family, direct, aside) in [("SL", VERMILION, AMBER), ("DL", GREEN, BLUE)] {
         let curve = |name: &str, colour| {
             Ok::<_, String>(branch_curve(flows.branch(&format!("{family} {name}"))?, KAPPA, MAX_R, colour))
         };
@@ -104,8 +104,8 @@ fn through(flows: &Run, sampled: &Run, family: &str) -> Claim {
 fn reached(flows: &Run, sampled: &Run, label: &str, family: &str, [x0, x1, y0, y1]: [f64; 4]) -> Result<Panel, String> {
     let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
     let mut panel = Panel::new(label, format!("contact {family}"), axes.0, axes.1);
-    let colours = if family == "SL" { [VERMILION, ORANGE] } else { [GREEN, BLUE] };
-    for (flow, colour, width) in [("b", colours[1], 4.2), ("c", SKY, 2.6), ("a", colours[0], 1.2)] {
+    let colours = if family == "SL" { [VERMILION, AMBER] } else { [GREEN, BLUE] };
+    for (flow, colour, width) in [("b", colours[1], 4.2), ("c", AZURE, 2.6), ("a", colours[0], 1.2)] {
         let branch = flows.branch(&format!("{family} by flow {flow}"))?;
         panel = panel.with(branch_curve(branch, SPEED, MAX_R, colour).wide(width).named(if flow == "c" {
             "flow (c)".to_string()

@@ -7,7 +7,7 @@ use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Ending, Kind, Response};
 use foldline_plot::figure::{Marker, Shape};
-use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, PURPLE, SKY};
+use foldline_plot::palette::{AMBER, AZURE, BLACK, BLUE, GREY, PALE, PURPLE};
 use foldline_plot::{Axis, Figure, Layer, Panel, branch_curve, branch_layers};
 
 pub const PLAN: FigurePlan = FigurePlan {
@@ -102,7 +102,7 @@ fn swept(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
     let s = branch_curve(run.branch("contact S")?, SPEED, MAX_R, BLUE).named("S");
     panel = panel.with(s).with_all(family(run, "SL", false)?).with_all(family(run, "DL", true)?);
     for (set, marker, shade, name) in
-        [(&simulated.up, Marker::Triangle, ORANGE, "sweep up"), (&simulated.down, Marker::Nabla, SKY, "sweep down")]
+        [(&simulated.up, Marker::Triangle, AMBER, "sweep up"), (&simulated.down, Marker::Nabla, AZURE, "sweep down")]
     {
         let places: Vec<[f64; 2]> = set.met.iter().map(|met| place(&met.motion)).collect();
         panel = panel.with(Layer::curve(&places, shade).wide(0.8));

@@ -6,7 +6,7 @@ use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Kind, SpecialPoint};
-use foldline_plot::palette::{BLACK, BLUE, ORANGE, VERMILION};
+use foldline_plot::palette::{AMBER, BLACK, BLUE, VERMILION};
 use foldline_plot::{Axis, Figure, Layer, Panel, branch_curve, special_layers};
 use std::fmt::Write;
 
@@ -41,7 +41,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
 /// Layers of the vanishing parts, as a broad band below the curve.
 fn band(all: &[(String, Fates)], name: &str) -> Vec<Layer> {
     let stretches = all.iter().filter(|(of, _)| of == name).flat_map(|(_, fates)| &fates.stretches);
-    let drawn = stretches.map(|s| Layer::curve(&s.places, ORANGE).wide(9.0).faint(0.45).named("vanishes as K grows"));
+    let drawn = stretches.map(|s| Layer::curve(&s.places, AMBER).wide(9.0).faint(0.45).named("vanishes as K grows"));
     drawn.collect()
 }
 

@@ -3,12 +3,12 @@
 use super::claims::{distances, order};
 use super::{Family, Level};
 use crate::akay2022::rotor::{FAMILIES, MAX_R, OMEGA, SPEED, colour};
-use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, PURPLE, SKY, VERMILION};
+use foldline_plot::palette::{AMBER, AZURE, BLACK, BLUE, GREY, PALE, PURPLE, VERMILION};
 use foldline_plot::{Axis, Layer, LegendPlace, Marker, Panel, branch_curve};
 use foldline_rotor::{Ratio, undamped_modes};
 
 /// Colours by decreasing unbalance.
-const LEVELS: [&str; 4] = [ORANGE, SKY, BLUE, BLACK];
+const LEVELS: [&str; 4] = [AMBER, AZURE, BLUE, BLACK];
 
 /// Returns every panel, in a grid of six columns.
 pub fn all(families: &[Family]) -> Result<Vec<Panel>, String> {
