@@ -252,14 +252,13 @@ fn switching_at_period_doublings_does_not_depend_on_the_unit_of_a_state() {
         );
         let study = "[[seed]]\nname = \"s\"\nattractor = \"fixed-point\"\n[[branch]]\nname = \"f\"\nfrom = \"s\"\nfree = \"r\"\n\
             range = [2.5, 3.5]\nswitch = { period-doubling = 1 }\n";
-        let found = crate::permuted::run(&model, study);
-        let doublings: Vec<f64> = found
-            .branches
+        let (text, code) = run(&model, study, "1e-6");
+        let doublings: Vec<f64> = ["f", "f/period-doubling-1"]
             .iter()
-            .flat_map(|branch| &branch.special)
-            .filter(|special| special.kind == Kind::PeriodDoubling)
-            .map(|special| special.point.parameters[0])
+            .flat_map(|branch| points(&text, branch, "period-doubling"))
+            .map(|line| value(line, 2))
             .collect();
+        assert_eq!(code, 0, "{text}");
         assert_eq!(doublings.len(), 2, "{unit}: {doublings:?}");
         assert!(
             (doublings[0] - 3.0).abs() < 1e-7 && (doublings[1] - 1.0 - 6f64.sqrt()).abs() < 1e-7,
@@ -283,12 +282,11 @@ x2 = "(0.392+0.423*p)*x0 + (-0.043+-0.551*p)*x1 + (-0.096+0.375*p)*x2 + -1.008*p
 "#;
     let study = "[[seed]]\nname = \"o\"\nstate = \"zero\"\n[[branch]]\nname = \"e\"\nfrom = \"o\"\nfree = \"p\"\nrange = [-1, 1]\n\
         [[curve]]\nname = \"c\"\nof = \"e\"\nhold = \"fold\"\nnear = 0.6833890963418737\nfree = \"q\"\nrange = [-1, 1]\nbranch-range = [-2, 2]\n";
-    let found = crate::permuted::run(model, study);
-    let points = &found.branch("c").unwrap().special;
-    let there: Vec<[f64; 2]> = points
+    let (text, _) = run(model, study, "1e-6");
+    let there: Vec<[f64; 2]> = points(&text, "c", "bogdanov-takens")
         .iter()
-        .filter(|special| special.kind == Kind::BogdanovTakens && (special.point.parameters[0] - 0.103).abs() < 1e-3)
-        .map(|special| [special.point.parameters[0], special.point.parameters[1]])
+        .map(|line| [value(line, 2), value(line, 3)])
+        .filter(|[p, _]| (p - 0.103).abs() < 1e-3)
         .collect();
     assert_eq!(there.len(), 1, "{there:?}");
     assert!((there[0][0] - 0.1029802999).abs() < 1e-9 && (there[0][1] + 0.0989555757).abs() < 1e-9, "{there:?}");

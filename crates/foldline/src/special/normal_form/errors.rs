@@ -126,10 +126,13 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         formula: &dyn Fn(&Sample) -> Option<Vec<f64>>,
     ) -> Option<Coefficients> {
         let field = self.setting.field;
-        let values = formula(&Sample { local: prepared(Local::new(field, self.at)?), point: self.at })?;
+        let own = prepared(Local::new(field, self.at)?);
+        let vectors = own.null_vectors();
+        let values = formula(&Sample { local: own, point: self.at })?;
         let mut errors = vec![0.0f64; values.len()];
         for (seed, point) in (1..).zip(&self.others) {
-            let local = prepared(Local::new(field, point)?).shaken(self.rounding * self.larger, sizes, seed);
+            let local = prepared(Local::new(field, point)?).oriented_like(vectors.clone());
+            let local = local.shaken(self.rounding * self.larger, sizes, seed);
             // If the formula fails for so small a displacement, the error is infinite.
             let other = formula(&Sample { local, point }).unwrap_or_else(|| vec![f64::NAN; values.len()]);
             for (error, (value, other)) in errors.iter_mut().zip(values.iter().zip(&other)) {

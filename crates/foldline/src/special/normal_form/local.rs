@@ -34,6 +34,8 @@ pub struct Local<'a> {
     units: Vec<f64>,
     /// `[n]` sizes of the states, in terms of which null vectors are computed; empty if they are 1.
     sizes: Vec<f64>,
+    /// Null vectors of a nearby point, whose orientation those of this point have.
+    near: Option<[Vec<f64>; 2]>,
     noise: Option<Noise>,
 }
 
@@ -84,6 +86,7 @@ impl<'a> Local<'a> {
             jacobian,
             units: Vec::new(),
             sizes: Vec::new(),
+            near: None,
             noise: None,
         })
     }
@@ -99,6 +102,12 @@ impl<'a> Local<'a> {
     /// Equilibrium with null vectors computed for states of `sizes` `[n]`.
     pub(super) fn with_sizes(mut self, sizes: &[f64]) -> Local<'a> {
         self.sizes = sizes.to_vec();
+        self
+    }
+
+    /// Equilibrium with null vectors oriented like these, of a nearby point.
+    pub(super) fn oriented_like(mut self, near: Option<[Vec<f64>; 2]>) -> Local<'a> {
+        self.near = near;
         self
     }
 
@@ -121,6 +130,7 @@ impl<'a> Local<'a> {
             jacobian,
             units: self.units.clone(),
             sizes: self.sizes.iter().map(|size| 1.0 / size).collect(),
+            near: None,
             noise: self.noise.clone(),
             ..*self
         }
@@ -235,7 +245,20 @@ impl<'a> Local<'a> {
     pub fn null_vectors(&self) -> Option<[Vec<f64>; 2]> {
         const ROUNDS: usize = 5;
         let generic = |k: f64| (0..self.n).map(|i| 0.6 + (1.0 + k * i as f64).sin()).collect();
-        (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))
+        let found = (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))?;
+        let Some(near) = &self.near else { return Some(found) };
+        // The sizes of q are those of the states, those of p the inverse ones.
+        let own = |i: usize| self.sizes.get(i).copied().unwrap_or(1.0);
+        let along = |k: usize| -> f64 {
+            let weight = |i: usize| if k == 0 { 1.0 / own(i) } else { own(i) };
+            (0..self.n).map(|i| (found[k][i] * weight(i)) * (near[k][i] * weight(i))).sum()
+        };
+        let turned = [0, 1].map(|k| along(k) < 0.0);
+        let mut found = found;
+        for (vector, _) in found.iter_mut().zip(turned).filter(|(_, turned)| *turned) {
+            vector.iter_mut().for_each(|x| *x = -*x);
+        }
+        Some(found)
     }
 
     /// Null vectors computed from approximate ones by a bordered system that is regular even at a double eigenvalue 0.
