@@ -177,6 +177,7 @@ fn a_branch_started_within_a_cluster_of_special_points_closes() {
         first_period: home.solution.free_period(),
         homecoming: Homecoming::default(),
         inspected: 0.0,
+        resolved: f64::INFINITY,
     };
     let ending = follow(&mut walk, start, None, 0, &mut |item| {
         match item {

@@ -185,6 +185,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         first_period: begun.point.solution.free_period(),
         homecoming: Homecoming::default(),
         inspected: 0.0,
+        resolved: f64::INFINITY,
     };
     let ending = follow(&mut walk, begun, None, 0, &mut |item| {
         if let Item::Point(point) = item {

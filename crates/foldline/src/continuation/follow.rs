@@ -52,6 +52,8 @@ pub struct Follow<'w> {
     pub first_period: Option<f64>,
     /// Closure detector; empty when a run begins.
     pub homecoming: Homecoming,
+    /// Longest piece of a step on which the number in place of a spectrum is resolved; see [`super::even`].
+    pub resolved: f64,
     /// Length of the step under inspection. A change that is significant over the step is significant on its parts.
     pub inspected: f64,
 }
@@ -59,7 +61,7 @@ pub struct Follow<'w> {
 impl Follow<'_> {
     /// Continuation of another problem with these settings, from a new start.
     pub fn on<'p>(&'p self, problem: &'p mut dyn ZeroProblem) -> Follow<'p> {
-        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, ..*self }
+        Follow { problem, homecoming: Homecoming::default(), inspected: 0.0, resolved: f64::INFINITY, ..*self }
     }
 }
 
@@ -203,7 +205,8 @@ pub fn follow(
         let factor = walk.settings.target_angle / (trend * angle).max(1e-12);
         let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
         let most = walk.settings.max_step / moving.as_ref().map_or(1.0, |moving| moving.rate);
-        step = (length * factor).clamp(walk.shortest(), most);
+        step = (length * factor).min(GROWTH * walk.resolved).clamp(walk.shortest(), most);
+        walk.resolved *= GROWTH;
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         let strange = walk.settings.stability && is_unexplained(&found);
         let spent = work(cost.factorisations, &right.mesh);

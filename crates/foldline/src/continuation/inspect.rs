@@ -42,6 +42,9 @@ const DEEPEST: usize = 14;
 /// Distance on one mesh below which rounding prevents telling two points of a curve apart.
 const CLOSEST: f64 = 1e-11;
 
+/// Number of halvings of the beginning of a first step of a boundary-value problem.
+const FIRST: usize = 3;
+
 /// Number of halvings after which an event must show at the ends of an interval.
 const CLOSE: usize = 6;
 
@@ -215,13 +218,13 @@ impl Follow<'_> {
         let quiet = located.is_empty() && !lost && left.point.unstable == right.point.unstable;
         let found: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let fits = !lost && explains(&found, left.point.unstable as i64, right.point.unstable as i64);
-        let mut even = false;
-        if self.settings.stability && fits && fold_test == FoldTest::Slope && depth < CLOSE {
-            let branch_points = self.monitors.iter().position(|monitor| monitor.kind() == Kind::BranchPoint);
-            let touching = branch_points
-                .filter(|_| quiet)
-                .and_then(|k| self.touching(k, [at_left[k], at_right[k]], &stretch, history, cost));
-            even = touching.is_some();
+        let touching = match self.settings.stability && fold_test == FoldTest::Slope {
+            true => self.touching(&stretch, &right.point, history.is_none() && depth < FIRST, cost),
+            false => None,
+        };
+        let touching = touching.map(|found| if quiet { found } else { Exchange::Apart(0.5 * stretch.length) });
+        let even = matches!(touching, Some(Exchange::Together(..)));
+        if touching.is_some() || self.settings.stability && fits && fold_test == FoldTest::Slope && depth < CLOSE {
             match touching.or_else(|| self.exchanged(&stretch, &right.point, history, cost)) {
                 Some(Exchange::Apart(there)) => cut_there = Some(there),
                 Some(Exchange::Together(kind, found)) if quiet => {

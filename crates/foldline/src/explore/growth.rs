@@ -695,6 +695,7 @@ impl Growth<'_> {
             first_period: branch.points.iter().min_by_key(|p| p.position.abs()).and_then(|p| p.solution.free_period()),
             homecoming: Homecoming::default(),
             inspected: 0.0,
+            resolved: f64::INFINITY,
         };
         // A resumed run may already be on its way back to the start.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();

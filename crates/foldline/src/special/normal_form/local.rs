@@ -245,7 +245,8 @@ impl<'a> Local<'a> {
     pub fn null_vectors(&self) -> Option<[Vec<f64>; 2]> {
         const ROUNDS: usize = 5;
         let generic = |k: f64| (0..self.n).map(|i| 0.6 + (1.0 + k * i as f64).sin()).collect();
-        let found = (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))?;
+        let found =
+            (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))?;
         let Some(near) = &self.near else { return Some(found) };
         // The sizes of q are those of the states, those of p the inverse ones.
         let own = |i: usize| self.sizes.get(i).copied().unwrap_or(1.0);
