@@ -189,7 +189,7 @@ fn stroboscopic_points_lie_on_the_branch() {
         .collect();
     let dots: Vec<[f64; 2]> = svg
         .lines()
-        .filter(|line| line.contains("<circle r=\"4\" stroke=\"none\"/>") && line.contains("opacity"))
+        .filter(|line| line.contains("<circle r=\"4\" stroke=\"none\"/>"))
         .map(|line| {
             let own = numbers(line.split("translate(").nth(1).unwrap_or_default());
             [own[0], own[1]]

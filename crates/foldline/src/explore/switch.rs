@@ -105,10 +105,9 @@ pub(super) fn step_off_from(
             problem.set_mesh(&mesh);
         }
         let along = |s: f64| -> Vec<f64> { base.iter().zip(direction).map(|(b, d)| b + s * d).collect() };
-        // Lengths are measured by the sizes of the states at the base.
-        problem.anchor(base);
-        let norm = problem.dot(direction, direction).sqrt();
         // The phase reference lies on the new branch: the base may have no phase at all (a Hopf point).
+        problem.anchor(&along(1.0));
+        let norm = problem.dot(direction, direction).sqrt();
         problem.anchor(&along(sign * distance / norm));
         let row: Vec<f64> = direction.iter().map(|d| sign * d / norm).collect();
         let scale = problem.dot(&row, &row).sqrt();
@@ -182,8 +181,12 @@ fn doubled(
     cycle: &Cycle,
 ) -> Result<Beginning, String> {
     let leave = |cycle: &Cycle, distances: &[f64]| {
-        let (mut problem, base, direction) =
+        let (mut problem, base, mut direction) =
             double(system, free, at, cycle).ok_or("no eigenvector of the multiplier -1 was found")?;
+        // Of unit length in the sizes of the states.
+        problem.anchor(&base);
+        let length = problem.dot(&direction, &direction).sqrt();
+        direction.iter_mut().for_each(|d| *d /= length);
         let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
         step_off(&mut *problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
     };
