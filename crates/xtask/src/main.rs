@@ -12,6 +12,7 @@ mod readers;
 mod release;
 mod site;
 mod spelling;
+mod tests;
 mod tree;
 
 use std::path::{Path, PathBuf};
@@ -70,18 +71,17 @@ fn main() -> ExitCode {
 
 /// Everything. What is installed for later steps is installed beside earlier ones, which rarely keep all cores busy.
 fn test() -> bool {
-    let tests = ["test", "--workspace", "--quiet"];
     std::thread::scope(|scope| {
         let environments = scope.spawn(|| readers::prepared() && python::prepared());
-        if !(check() && cargo(&[&tests[..], &["--no-run"]].concat())) {
+        if !check() {
             return false;
         }
+        let Some(built) = tests::build() else { return false };
         scope.spawn(cargo_deny);
         // A failure is reported where the environment is used.
         let _ = environments.join();
-        // Side by side, because many programs of the Rust tests end with one long test on one core.
         let others = scope.spawn(|| [("page", page::test_built()), ("Python package", python::test())]);
-        let own = cargo(&[&tests[..], &["--no-fail-fast"]].concat());
+        let own = tests::pass(built);
         let others = others.join().unwrap_or([("others", false); 2]);
         let verdicts = std::iter::once(("Rust code", own)).chain(others);
         let failed: Vec<&str> = verdicts.filter(|(_, passed)| !passed).map(|(what, _)| what).collect();
