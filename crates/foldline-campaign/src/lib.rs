@@ -44,7 +44,7 @@ pub const TOLERANCE: f64 = 1e-6;
 pub const DEGREE: usize = 4;
 
 /// Default time limit of a case, a generous safety margin: 200 rotors together take about 4 minutes of processor time.
-pub const LIMIT: Duration = Duration::from_secs(300);
+pub const LIMIT: Duration = Duration::from_secs(900);
 
 /// Examines every case on `jobs` threads, each within `limit`. `tell` is called with the index and report of each case
 /// as it finishes.

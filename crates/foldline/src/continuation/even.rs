@@ -3,7 +3,7 @@
 //! **Idea.** A solution of a boundary-value problem has no spectrum, only one number d, which has the sign of the determinant
 //! of F_u and vanishes with its smallest singular value ([`crate::problem::cycle`]). Steps are chosen for the solution, which may be
 //! trivial while d oscillates. A step on which the value of d at a quarter differs from that of the parabola through ends and
-//! middle is therefore cut, until the pieces resolve d.
+//! middle is therefore cut, until the pieces resolve d. Where d goes on in a straight line from the step before, nothing is computed.
 //!
 //! Where an even number of singular values vanish at one point, d touches zero without a change of sign, like |s|. If the values lead
 //! to zero, or dip towards it, without a change of sign at the end, the place where |d| is smallest is searched for. Either it
@@ -22,6 +22,7 @@
 //! **Fails when** the right-hand side of d hardly excites the null vectors, so that the corner is a narrow dip; or an odd number of at least three vanish: the point is then found, but not all branches that leave it.
 
 use super::follow::Follow;
+use super::inspect::History;
 use super::locate::{Located, Stretch};
 use super::opposite::Exchange;
 use crate::contract::Sight;
@@ -32,6 +33,13 @@ use crate::diagram::{Cost, Kind, Point, Solution};
 const NOTHING: f64 = 1e-6;
 /// Largest difference of d at a quarter of a step from the parabola, in sizes of d; see (1).
 const RESOLVED: f64 = 1.0 / 75.0;
+/// Relative Newton correction with which d is known well enough for (1).
+const ROUGH: f64 = 1e-3;
+/// Largest second difference of d over two steps, in sizes of d, that leaves no doubt. For an oscillation it is the square of the
+/// angle θ of a step: 0.22, from which no single growth of the step leads to an angle that is not resolved.
+const STRAIGHT: f64 = 0.05;
+/// Number of halvings of the beginning of a first step.
+const FIRST: usize = 3;
 /// Share of the smaller end below which a parabola dips towards zero.
 const DIP: f64 = 0.1;
 /// Share of the larger end below which the middle value may lie next to a zero at the other end: sin(θ/2)/sin θ = 0.61 for the
@@ -72,16 +80,23 @@ impl Follow<'_> {
         &mut self,
         stretch: &Stretch,
         right: &Point,
-        first: bool,
+        history: Option<&History>,
+        depth: usize,
         cost: &mut Cost,
     ) -> Option<Exchange> {
         let (ends, length) = ([Degeneracy::of(&stretch.left.point)?, Degeneracy::of(right)?], stretch.length);
         // The length of a first step is a guess.
-        if first {
+        if history.is_none() && depth < FIRST {
             self.resolved = self.resolved.min(0.5 * length.abs());
             return Some(Exchange::Apart(0.5 * length));
         }
-        let [quarter, middle] = [0.25, 0.5].map(|share| self.degeneracy(stretch, share * length, cost));
+        if history.is_some_and(|before| continues(before, ends, length)) {
+            return None;
+        }
+        let [quarter, middle] = [0.25, 0.5].map(|share| {
+            let found = stretch.nearly_at(ROUGH, self.problem, share * length, cost).ok()?;
+            Degeneracy::of(&found.point)
+        });
         let (quarter, middle) = (quarter?, middle?);
         let between = [ends[0], middle, ends[1]].map(|point| point.determinant);
         // Where d has a corner it is never resolved.
@@ -170,6 +185,14 @@ impl Follow<'_> {
         let found = stretch.seen_at(Sight::Stability, self.problem, self.settings, s, cost).ok()?;
         Degeneracy::of(&found.point)
     }
+}
+
+/// True if d goes on as from the point before, and stays away from zero.
+fn continues(before: &History, [a, b]: [Degeneracy; 2], length: f64) -> bool {
+    let [z] = before.spectrum[..] else { return false };
+    let bend = b.d - a.d - (a.d - (1.0 - z.re)) / before.distance * length.abs();
+    let [least, largest] = [f64::min, f64::max].map(|pick| pick(a.determinant.abs(), b.determinant.abs()));
+    bend.abs() < STRAIGHT * a.d.abs().max(b.d.abs()) && a.determinant * b.determinant > 0.0 && least > LEADS * largest
 }
 
 /// True if a step resolves d, whose values at its beginning, a quarter and half of the way and at its end are given.

@@ -42,9 +42,6 @@ const DEEPEST: usize = 14;
 /// Distance on one mesh below which rounding prevents telling two points of a curve apart.
 const CLOSEST: f64 = 1e-11;
 
-/// Number of halvings of the beginning of a first step of a boundary-value problem.
-const FIRST: usize = 3;
-
 /// Number of halvings after which an event must show at the ends of an interval.
 const CLOSE: usize = 6;
 
@@ -219,7 +216,7 @@ impl Follow<'_> {
         let found: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let fits = !lost && explains(&found, left.point.unstable as i64, right.point.unstable as i64);
         let touching = match self.settings.stability && fold_test == FoldTest::Slope {
-            true => self.touching(&stretch, &right.point, history.is_none() && depth < FIRST, cost),
+            true => self.touching(&stretch, &right.point, history, depth, cost),
             false => None,
         };
         let touching = touching.map(|found| if quiet { found } else { Exchange::Apart(0.5 * stretch.length) });

@@ -98,6 +98,21 @@ impl<'s> Stretch<'s> {
         Ok(seen(sight, problem, u, tangent, self.direction))
     }
 
+    /// Spectrum at distance s, from a point that Newton's method moves by less than the relative distance `close`.
+    pub(super) fn nearly_at(
+        &self,
+        close: f64,
+        problem: &mut dyn ZeroProblem,
+        s: f64,
+        cost: &mut Cost,
+    ) -> Result<Station, Failure> {
+        problem.set_mesh(&self.left.mesh);
+        problem.anchor(&self.left.u);
+        let mut u = self.predicted(problem, s);
+        let tangent = arrive(problem, &mut u, &self.left.tangent, close, cost)?;
+        Ok(seen(Sight::Stability, problem, u, tangent, self.direction))
+    }
+
     /// Unknowns and tangent at distance s.
     fn arrived(
         &self,

@@ -391,6 +391,9 @@ pub struct Growth<'g> {
 
 /// Number of corners on one side of a branch, after which something is wrong.
 const CORNERS: usize = 32;
+/// Share of the sizes by which a cycle may pass the surface of an event before it counts as no motion: more than points of the
+/// usual tolerances are off.
+const TRESPASS: f64 = 1e-4;
 /// Number of times that a connecting orbit is lengthened on one side of a curve: a bound on the work.
 const LENGTHENINGS: usize = 20;
 /// Points at either end of a branch that always stay whole, since continuation needs them.
@@ -707,6 +710,7 @@ impl Growth<'_> {
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
         let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
+        let trespassed: RefCell<Option<String>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -760,6 +764,12 @@ impl Growth<'_> {
                     }
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
+                    if system.field.event_count() > 0 && branch.held.is_none() {
+                        trespassed.replace(impact::trespass([TRESPASS; 2], system.field, &point));
+                        if trespassed.borrow().is_some() {
+                            return Verdict::Stop;
+                        }
+                    }
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
@@ -777,6 +787,10 @@ impl Growth<'_> {
             let there = latest.borrow().clone();
             let mut next = None;
             if at == Kind::ImpactGrazing {
+                if let Some(why) = beside_impacts::accumulation(system.field, &there) {
+                    ending = Ending::GivenUp(why);
+                    break;
+                }
                 let Some((problem, station)) = beyond.take() else { break };
                 (other, next) = (Some(problem), Some(station));
             }
@@ -835,6 +849,9 @@ impl Growth<'_> {
                 true => Ending::Stopped,
                 false => follow(&mut walk, start, None, position, &mut sink),
             };
+        }
+        if let Some(why) = trespassed.take() {
+            return Ending::GivenUp(format!("the next point is no motion: {why}"));
         }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
@@ -962,7 +979,7 @@ impl Growth<'_> {
             Solution::Cycle(cycle) => impacts(system.field, &point.parameters, cycle).len(),
             Solution::Equilibrium(_) | Solution::Torus(_) => 0,
         };
-        let own = count(&special.point);
+        let own = beside_impacts::count(system.field, &special.point);
         let Some(next) = next else {
             special.remark = format!("impacts {own}; no cycle with another sequence was found beside it");
             return;

@@ -13,11 +13,11 @@ use crate::contract::{Examination, VectorField, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Cycle, Point, Solution};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::gauss::Scheme;
-use crate::problem::impact::stored::{Impact, after, impacts, surfaces, times_of, with_node};
+use crate::problem::impact::stored::{Impact, after, hard, impacts, surfaces, times_of, with_node};
 use crate::problem::impact::{Flights, ImpactProblem};
 use crate::problem::mesh;
 use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
-use crate::special::impact::{highest, inadmissible, speed};
+use crate::special::impact::{Highest, highest, inadmissible, speed, usual_speed};
 
 /// Relative accuracy of the trajectory.
 const INTEGRATION: f64 = 1e-9;
@@ -234,13 +234,59 @@ pub(super) fn grazes(field: &dyn VectorField, at: &Point) -> bool {
     }
     let all = impacts(field, &at.parameters, cycle);
     let least = all.iter().map(|own| speed(field, &at.parameters, cycle, own).abs()).fold(f64::INFINITY, f64::min);
-    least < SLOW * usual(cycle, highest(field, &at.parameters, cycle).size)
+    least < SLOW * usual_speed(cycle, highest(field, &at.parameters, cycle).size)
 }
 
-/// Speed of an oscillation of a size with the period of a cycle, in the time of the field.
-fn usual(cycle: &Cycle, size: f64) -> f64 {
-    let whole = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
-    size * std::f64::consts::TAU / whole
+/// The events of a cycle at an impact grazing, their speeds, and the one that loses its speed, if none is about to begin.
+struct Grazed {
+    all: Vec<Impact>,
+    speeds: Vec<f64>,
+    vanishes: Option<usize>,
+    touch: Highest,
+}
+
+impl Grazed {
+    fn of(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Grazed {
+        let touch = highest(field, parameters, cycle);
+        let speeds_of =
+            |all: &[Impact]| all.iter().map(|own| speed(field, parameters, cycle, own).abs()).collect::<Vec<f64>>();
+        let all = impacts(field, parameters, cycle);
+        let speeds = speeds_of(&all);
+        let slowest = (0..all.len()).min_by(|a, b| speeds[*a].total_cmp(&speeds[*b]));
+        let usual = usual_speed(cycle, touch.size);
+        let vanishes = slowest.filter(|k| speeds[*k] / usual < touch.value.abs() / touch.size);
+        if vanishes.is_some() {
+            return Grazed { all, speeds, vanishes, touch };
+        }
+        // An orbit that touches the surface may have an interval that ends there, like one with an event without speed.
+        let all = hard(field, parameters, cycle);
+        Grazed { speeds: speeds_of(&all), all, vanishes, touch }
+    }
+}
+
+/// Number of events of a cycle at an impact grazing: with the one that loses its speed, without the one that begins.
+pub(super) fn count(field: &dyn VectorField, at: &Point) -> usize {
+    match &at.solution {
+        Solution::Cycle(cycle) => Grazed::of(field, &at.parameters, cycle).all.len(),
+        Solution::Equilibrium(_) | Solution::Torus(_) => 0,
+    }
+}
+
+/// Why a branch is not followed beyond an impact grazing, at which one more event begins although others hardly have any speed;
+/// `None` if it is.
+pub(super) fn accumulation(field: &dyn VectorField, at: &Point) -> Option<String> {
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    let found = Grazed::of(field, &at.parameters, cycle);
+    let least = found.speeds.iter().copied().fold(f64::INFINITY, f64::min) / usual_speed(cycle, found.touch.size);
+    let count = found.all.len();
+    (found.vanishes.is_none() && least < SLOW).then(|| {
+        format!(
+            "the impacts accumulate: of {count} per period the slowest has {least:.0e} of the speed of the motion, and another one begins; \
+             beyond lies chatter, an unlimited number of impacts and sustained contact after them\n\
+             sustained contact is not followed\n\
+             replace the rigid wall by a stiff spring with damping to follow the branch further"
+        )
+    })
 }
 
 /// Events, and the cycle with a mesh node at each of them.
@@ -259,12 +305,8 @@ pub(super) fn beyond<'a>(
 ) -> Option<Beyond<'a>> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let (field, parameters) = (system.field, &at.parameters);
-    let mut all = impacts(field, parameters, cycle);
-    let speeds: Vec<f64> = all.iter().map(|own| speed(field, parameters, cycle, own).abs()).collect();
-    let slowest = (0..all.len()).min_by(|a, b| speeds[*a].total_cmp(&speeds[*b]));
-    let touch = highest(field, parameters, cycle);
-    let usual = usual(cycle, touch.size);
-    let vanishes = slowest.filter(|k| speeds[*k] / usual < touch.value.abs() / touch.size);
+    let Grazed { mut all, speeds, vanishes, touch } = Grazed::of(field, parameters, cycle);
+    let usual = usual_speed(cycle, touch.size);
     let own = setting(system, free, parameters);
     let sequences: Vec<Sequence> = match vanishes {
         Some(slowest) => {

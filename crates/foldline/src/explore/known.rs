@@ -157,6 +157,11 @@ fn turn(problem: &mut dyn ZeroProblem, from: &Point, to: &Point) -> Option<f64> 
     if from.tangent.is_empty() || to.tangent.is_empty() || mesh.is_empty() != there.is_empty() {
         return None;
     }
+    // Two cycles may have different numbers of events, or of unknowns determined by conditions.
+    problem.set_mesh(&mesh);
+    if problem.unknowns() != from.tangent.len() {
+        return None;
+    }
     problem.set_mesh(&there);
     let u = problem.unknowns_of(to);
     let along = if mesh.is_empty() { from.tangent.clone() } else { problem.transfer(&from.tangent, &mesh, &there) };

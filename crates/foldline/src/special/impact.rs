@@ -17,7 +17,10 @@
 //!
 //! **Source.** nordmark1991; dibernardo2008, §6.
 //!
-//! **Fails when** a flight touches the surface twice between two samples, an eighth of a mesh interval.
+//! After an impact of small speed the motion may return to the surface within a time that is small in proportion to that speed.
+//! Samples are therefore closer together in geometric progression towards both ends of a flight.
+//!
+//! **Fails when** a flight touches the surface twice between two samples, an eighth of a mesh interval, not next to an event.
 
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Ending, Kind, Point, Solution};
@@ -26,6 +29,10 @@ use crate::problem::impact::stored::{Impact, hard, impacts, surfaces, times_of};
 
 /// Sections of a mesh interval at whose ends a switch is compared with its neighbours.
 const SECTIONS: usize = 8;
+/// Number of halvings of the first and the last section of a flight.
+const HALVINGS: i32 = 20;
+/// Depth of a minimum between an event and a maximum, relative to the largest value, that exceeds rounding.
+const DEEP: f64 = 1e-13;
 /// Distance of places, in intervals, up to which they are the same.
 const SAME_PLACE: f64 = 1e-3;
 /// Rounds of parabolas about a maximum.
@@ -119,12 +126,25 @@ pub fn inadmissible(field: &dyn VectorField, at: &Point) -> Option<String> {
             }
         }
     }
-    let slow = speeds(field, &at.parameters, cycle).iter().any(|v| *v < 0.0);
-    if slow {
+    trespass([0.0, 1e-9], field, at)
+}
+
+/// Reason why a cycle is not one of the motion with its events, which it passes in the wrong direction, or leaves out, by more than
+/// the given shares of the sizes of speeds and switches.
+pub fn trespass(slack: [f64; 2], field: &dyn VectorField, at: &Point) -> Option<String> {
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    let highest = highest(field, &at.parameters, cycle);
+    let least = -slack[0] * usual_speed(cycle, highest.size);
+    if speeds(field, &at.parameters, cycle).iter().any(|v| *v < least) {
         return Some("an event is passed in the wrong direction".into());
     }
-    let highest = highest(field, &at.parameters, cycle);
-    (highest.value > 1e-9 * highest.size).then(|| "it passes the surface of an event without it".into())
+    (highest.value > slack[1] * highest.size).then(|| "it passes the surface of an event without it".into())
+}
+
+/// Speed of an oscillation of a size with the period of a cycle, in the time of the field.
+pub(crate) fn usual_speed(cycle: &Cycle, size: f64) -> f64 {
+    let whole = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    size * std::f64::consts::TAU / whole
 }
 
 /// v of (1) of all events of a cycle.
@@ -200,8 +220,11 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
     };
     let (mut found, mut size): (Vec<(f64, f64, usize)>, f64) = (Vec::new(), 0.0);
     for ([first, last], ends) in flights {
-        let places: Vec<f64> = (first * SECTIONS..last * SECTIONS)
-            .map(|k| k as f64 / SECTIONS as f64)
+        let closer = |k: i32| 0.5f64.powi(k) / SECTIONS as f64;
+        let places: Vec<f64> = std::iter::once(first as f64)
+            .chain((1..=HALVINGS).rev().map(|k| first as f64 + closer(k)))
+            .chain((first * SECTIONS + 1..last * SECTIONS).map(|k| k as f64 / SECTIONS as f64))
+            .chain((1..=HALVINGS).map(|k| last as f64 - closer(k)))
             .chain([last as f64 - 1e-12])
             .collect();
         let values: Vec<Vec<f64>> = places.iter().map(|place| at(*place)).collect();
@@ -244,9 +267,10 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
 /// maximum. A stretch at the beginning that is positive does not count.
 fn maxima(values: &[f64], on: [bool; 2]) -> Vec<usize> {
     let last = values.len() - 1;
-    let below = if values[1] > 0.0 { values.iter().position(|h| *h < 0.0).unwrap_or(last) } else { 0 };
+    let deep = -DEEP * values.iter().fold(0.0f64, |most, h| most.max(h.abs()));
+    let below = if values[1] > -deep { values.iter().position(|h| *h < 0.0).unwrap_or(last) } else { 0 };
     let inner = |k: usize| values[k] > values[k - 1] && values[k] >= values[k + 1];
-    let dips = |k: usize| values[k] <= values[k - 1] && values[k] < values[k + 1];
+    let dips = |k: usize| values[k] < deep && values[k] <= values[k - 1] && values[k] < values[k + 1];
     let falls: Vec<usize> = (1..last).filter(|k| dips(*k)).collect();
     let between =
         |k: usize| (!on[0] || falls.iter().any(|dip| *dip < k)) && (!on[1] || falls.iter().any(|dip| *dip > k));

@@ -29,10 +29,10 @@
 use super::CycleProblem;
 use crate::contract::{Batch, Examination, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{Point, Solution, Symmetry};
-use crate::linalg::dot;
 use crate::linalg::ends::Ends;
 use crate::linalg::lane::Lane;
 use crate::linalg::system::{System, either};
+use crate::linalg::{axpy, dot};
 use crate::problem::defect::Defect;
 use crate::problem::gauss::Scheme;
 use crate::problem::piecewise::OneBranch;
@@ -63,6 +63,12 @@ impl CycleProblem<'_> {
             end.iter_mut().zip(node).for_each(|(x, v)| *x += weight * v);
         }
         [profile[..n].to_vec(), end]
+    }
+
+    /// Places of the residuals of (1) and (2).
+    pub(super) fn places_of_conditions(&self) -> impl Iterator<Item = usize> {
+        let (size, first) = (self.profile_size(), (self.intervals() - 1) * self.block());
+        (first..first + self.n).chain(size + 1..size + 1 + self.surplus())
     }
 
     /// Left-hand sides of (1) and (2) for gathered states.
@@ -219,35 +225,46 @@ impl CycleProblem<'_> {
 
     /// The number 1 - d of (3) in place of a spectrum, from the last factorisation.
     pub(super) fn degeneracy(&self, u: &[f64]) -> Examination {
-        let count = u.len();
         if let Some([spectrum, _]) = self.setting.field.saddles(&self.setting.at(&u[self.profile_size() + 1..])) {
             let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
             return Examination { spectrum, unstable, ..Examination::default() };
         }
         let orientation = self.system.ends().map_or(1.0, Ends::orientation);
-        let (mut right, mut x) = (vec![0.0; count], vec![0.0; count]);
-        right[count - 1] = 1.0;
-        self.solve_open(&right, &mut x);
-        let slope = x[count - 1] / self.dot(&x, &x).sqrt();
-        let d = slope * orientation * self.response().1;
+        let tangent = self.tangent();
+        let d = tangent[tangent.len() - 1] * orientation / self.response(&tangent).1;
         let spectrum = vec![Complex64::new(1.0 - d, 0.0)];
         // The number of negative d tells folds from branch points.
         Examination { spectrum, unstable: usize::from(d < 0.0), ..Examination::default() }
     }
 
-    /// y / |y| and 1 / |y| of (3), from the last factorisation.
-    fn response(&self) -> (Vec<f64>, f64) {
-        let (size, first, n) = (self.profile_size(), (self.intervals() - 1) * self.block(), self.n);
+    /// The unit tangent, from the last factorisation.
+    fn tangent(&self) -> Vec<f64> {
+        let count = self.unknowns();
+        let (mut right, mut tangent) = (vec![0.0; count], vec![0.0; count]);
+        right[count - 1] = 1.0;
+        self.solve_open(&right, &mut tangent);
+        self.unit(&mut tangent);
+        tangent
+    }
+
+    /// Divides a vector by its length, which it returns.
+    fn unit(&self, x: &mut [f64]) -> f64 {
+        let length = self.dot(x, x).sqrt();
+        x.iter_mut().for_each(|x| *x /= length);
+        length
+    }
+
+    /// y / |y| and |y| of (3), from the last factorisation, whose last row may have been another than the tangent.
+    fn response(&self, tangent: &[f64]) -> (Vec<f64>, f64) {
         let count = self.unknowns();
         let (mut right, mut y) = (vec![0.0; count], vec![0.0; count]);
-        let places = (first..first + n).chain(size + 1..size + 1 + self.surplus());
-        for (k, (place, weight)) in places.zip(self.sizes_of_conditions()).enumerate() {
+        for (k, (place, weight)) in self.places_of_conditions().zip(self.sizes_of_conditions()).enumerate() {
             right[place] = weight * (0.3 + 0.7 * (k * k) as f64).sin();
         }
         self.solve_open(&right, &mut y);
-        let length = self.dot(&y, &y).sqrt();
-        y.iter_mut().for_each(|y| *y /= length);
-        (y, 1.0 / length)
+        axpy(-self.dot(&y, tangent), tangent, &mut y);
+        let length = self.unit(&mut y);
+        (y, length)
     }
 
     /// Size of every condition: its change if the states change by their scales.
@@ -274,7 +291,8 @@ impl CycleProblem<'_> {
     /// Errors of y / |y| on every interval, the relative error of |y|, both estimated like those of the solution, and the factor by
     /// which defects on single intervals grow.
     pub(super) fn errors_of_response(&self, u: &[f64], scale: &[f64]) -> (Vec<f64>, f64, f64) {
-        let (y, share) = self.response();
+        let tangent = self.tangent();
+        let (y, length) = self.response(&tangent);
         let (n, size, count) = (self.n, self.profile_size(), self.intervals());
         let parameters = self.setting.at(&u[size + 1..]);
         let change = self.setting.spread(&y[size + 1..]);
@@ -324,9 +342,10 @@ impl CycleProblem<'_> {
         let rhs = self.defects_of(&ends, &sources, u.len());
         let mut shift = vec![0.0; u.len()];
         self.solve_defects(&rhs, &mut shift);
+        axpy(-self.dot(&shift, &tangent), &tangent, &mut shift);
         let along = self.dot(&shift, &y);
-        shift.iter_mut().zip(&y).for_each(|(s, y)| *s -= along * y);
-        let off = (along * share).abs();
+        axpy(-along, &y, &mut shift);
+        let off = (along / length).abs();
         let sizes: Vec<f64> = misses
             .chunks_exact(n)
             .map(|e| e.iter().zip(scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
