@@ -85,9 +85,10 @@ def view(
     opened = f"#{urlencode(address)}" if address else ""
     widget = _in_notebook() if browser is None else not browser
     made = _widget_class() if widget else None
-    kept = None if diagram.folder is not None else tempfile.TemporaryDirectory(prefix="foldline-view-")
-    folder = diagram.folder if kept is None else os.path.join(kept.name, "run")
-    if kept is not None:
+    folder, kept = diagram.folder, None
+    if folder is None:
+        kept = tempfile.TemporaryDirectory(prefix="foldline-view-")
+        folder = os.path.join(kept.name, "run")
         diagram.save(folder)
     page = _native.page(folder, list(named.values()), opened, _SPACE_IN_NOTEBOOK if widget else _SPACE)
     if made is not None:

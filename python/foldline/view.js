@@ -36,7 +36,7 @@ function render({ model, el }) {
   model.on("msg:custom", heard);
   const frame = document.createElement("iframe");
   frame.title = "foldline explorer";
-  frame.style.cssText = `width: 100%; height: ${model.get("height")}px; border: 1px solid #8886; border-radius: 8px; display: block;`;
+  frame.style.cssText = `width: 100%; height: ${model.get("height")}px; box-sizing: border-box; border: 1px solid #8886; border-radius: 8px; display: block;`;
   frame.foldline = { solution, dark: isDark() };
   frame.srcdoc = model.get("page");
   el.append(frame);

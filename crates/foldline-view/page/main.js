@@ -239,8 +239,8 @@ class App {
       this.controls();
       return;
     }
-    if (computed.length > 0) this.tell("");
     this.diagram.setAxes(qx, qy, this.log[0], this.log[1]);
+    if (computed.length > 0) this.tell(this.selected ? this.diagram.line(this.selected) : "");
     this.controls();
     this.show();
     this.remember();

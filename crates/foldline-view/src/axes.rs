@@ -52,7 +52,10 @@ fn harmonics(model: &Model) -> Vec<String> {
     let endings: &[&str] = if model.forced() { &["", "_dB", "_phase"] } else { &["", "_dB"] };
     let of = |(name, signs): (&str, &[&str])| {
         let orders = (1..=ORDERS).flat_map(|k| signs.iter().map(move |sign| format!("{sign}{k}")));
-        orders.flat_map(|order| endings.iter().map(move |ending| format!("_h{order}{ending}"))).map(|end| format!("{name}{end}")).collect()
+        orders
+            .flat_map(|order| endings.iter().map(move |ending| format!("_h{order}{ending}")))
+            .map(|end| format!("{name}{end}"))
+            .collect()
     };
     single.chain(pair).flat_map(|signal| -> Vec<String> { of(signal) }).collect()
 }

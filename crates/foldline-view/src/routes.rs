@@ -238,9 +238,18 @@ enum Asked {
     State,
     /// Names of harmonics.
     Export(Vec<String>),
-    Special { columns: Vec<usize> },
-    Points { epoch: u64, since: u64, columns: Vec<usize> },
-    Solution { branch: i64, place: Place },
+    Special {
+        columns: Vec<usize>,
+    },
+    Points {
+        epoch: u64,
+        since: u64,
+        columns: Vec<usize>,
+    },
+    Solution {
+        branch: i64,
+        place: Place,
+    },
 }
 
 impl Asked {

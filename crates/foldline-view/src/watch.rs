@@ -3,9 +3,9 @@
 //! **Idea.** The file says which positions each branch has; `log` numbers them in the order in which they were first
 //! seen. The numbers of the points stay in the file, which is opened for each look and closed at once (`foldline_store::run_file`).
 
+use crate::axes::{self, Axis};
 use crate::describe::{described, state};
 use crate::frame::frame;
-use crate::axes::{self, Axis};
 use crate::log::{Log, PROFILES, ROWS, Stretch};
 use crate::orbit::{Place, solution};
 use foldline::diagram::{Branch, Diagram, Kind, Point};

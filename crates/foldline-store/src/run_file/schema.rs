@@ -123,9 +123,7 @@ pub(super) fn create(columns: &Columns) -> String {
 /// Returns the statement that creates the index of the quantities of diagrams unless it exists.
 pub(super) fn index(columns: &Columns) -> String {
     let shown: String = columns.names().map(|name| format!("{}, ", quoted(name))).collect();
-    format!(
-        "CREATE INDEX IF NOT EXISTS {INDEX} ON points (branch, position, unstable, period, {shown} average_bytes);"
-    )
+    format!("CREATE INDEX IF NOT EXISTS {INDEX} ON points (branch, position, unstable, period, {shown} average_bytes);")
 }
 
 /// Returns the statements that upgrade a file from `version` to the next one.
