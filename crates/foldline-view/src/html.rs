@@ -15,7 +15,7 @@ use foldline_store::run_file::RunFileError;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What a page shows.
+/// Choices for a page.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// Names of harmonics and of combinations of quantities that are axes in addition to the stored quantities.
