@@ -90,7 +90,7 @@ def view(
         kept = tempfile.TemporaryDirectory(prefix="foldline-view-")
         folder = os.path.join(kept.name, "run")
         diagram.save(folder)
-    page = _native.page(folder, list(named.values()), opened, _SPACE_IN_NOTEBOOK if widget else _SPACE)
+    page = _native.page(folder, list(named.values()), opened, _SPACE_IN_NOTEBOOK if widget else _SPACE, not widget)
     if made is not None:
         return made(page, height, _native.Explored(folder), kept)
     if kept is not None:

@@ -15,10 +15,18 @@ fn failed(py: Python, error: &Failure) -> PyErr {
 }
 
 /// Returns the run in a folder as one HTML page. `axes` are harmonics that it has in addition to the stored quantities,
-/// `view` is the view with which it opens, as in its address, and `space` the number of bytes for orbits.
+/// `view` is the view with which it opens, as in its address, and `space` the number of bytes for orbits; with `special`
+/// those of all special points are included in any case.
 #[pyfunction]
-pub fn page(py: Python, folder: PathBuf, axes: Vec<String>, view: String, space: usize) -> PyResult<String> {
-    let made = py.detach(|| html(&folder, &Shown { axes, view, space }));
+pub fn page(
+    py: Python,
+    folder: PathBuf,
+    axes: Vec<String>,
+    view: String,
+    space: usize,
+    special: bool,
+) -> PyResult<String> {
+    let made = py.detach(|| html(&folder, &Shown { axes, view, space, special }));
     made.map(|(page, _)| page).map_err(|error| failed(py, &error))
 }
 

@@ -24,11 +24,13 @@ pub struct Shown {
     pub view: String,
     /// Size of all solutions in bytes, before base64, up to which further ones are included.
     pub space: usize,
+    /// True if the solutions of all special points are included, whatever their size.
+    pub special: bool,
 }
 
 impl Default for Shown {
     fn default() -> Shown {
-        Shown { axes: Vec::new(), view: String::new(), space: 6 << 20 }
+        Shown { axes: Vec::new(), view: String::new(), space: 6 << 20, special: true }
     }
 }
 
@@ -81,7 +83,7 @@ pub fn html(folder: &Path, shown: &Shown) -> Result<(String, Amount), Failure> {
         }
         since = next;
     }
-    let solutions = solutions(&watch, &text["state"], shown.space, &mut data)?;
+    let solutions = solutions(&watch, &text["state"], shown, &mut data)?;
     let page = PAGE
         .replace("<link rel=\"stylesheet\" href=\"app.css\">", &format!("<style>\n{STYLE}</style>"))
         .replace("<link rel=\"icon\" href=\"icon.svg\">", POLICY)
@@ -125,8 +127,9 @@ pub fn solution(watch: &Watch, branch: i64, place: Place) -> Result<Option<Vec<u
     Ok(watch.solution(branch, place)?.map(|frame| single(&frame)))
 }
 
-/// Adds solutions of special points, and of every k-th point such that they fit into `space` bytes.
-fn solutions(watch: &Watch, state: &Value, space: usize, data: &mut Vec<String>) -> Result<usize, Failure> {
+/// Adds solutions of special points, and of every k-th point such that they fit into the space.
+fn solutions(watch: &Watch, state: &Value, shown: &Shown, data: &mut Vec<String>) -> Result<usize, Failure> {
+    let full = |size: usize| !shown.special && size >= shown.space;
     let list = |key: &str| state[key].as_array().map(Vec::as_slice).unwrap_or_default();
     let mut places = Vec::new();
     for own in list("special") {
@@ -147,6 +150,9 @@ fn solutions(watch: &Watch, state: &Value, space: usize, data: &mut Vec<String>)
         Ok(())
     };
     for (branch, place) in places {
+        if full(size) {
+            return Ok(count);
+        }
         add(branch, place, &mut size)?;
     }
     let reaches: Vec<(i64, [i64; 2])> = list("branches")
@@ -155,11 +161,14 @@ fn solutions(watch: &Watch, state: &Value, space: usize, data: &mut Vec<String>)
         .collect();
     // The size of one solution, from the first point of each branch.
     for (branch, [first, _]) in &reaches {
+        if full(size) {
+            return Ok(count);
+        }
         add(*branch, Place::Position(*first), &mut size)?;
     }
     let points: i64 = reaches.iter().map(|(_, [first, last])| last - first).sum();
     let mean = (size / (list("special").len() + reaches.len()).max(1)).max(1);
-    let room = (space.saturating_sub(size) / mean).max(1);
+    let room = (shown.space.saturating_sub(size) / mean).max(1);
     let every = (points.max(1) as usize).div_ceil(room).max(1);
     for (branch, [first, last]) in reaches {
         let positions =

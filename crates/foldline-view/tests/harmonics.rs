@@ -109,6 +109,11 @@ fn a_saved_page_has_the_harmonics_that_were_asked_for() {
     assert!(page.contains("id=\"data-view\">\"#x=Omega&y=x_h1_dB\"</script>"));
     let (plain, _) = html(&path, &Shown::default()).expect("the run can be read");
     assert!(!plain.contains("\"name\":\"x_h1_dB\"") && !plain.contains("id=\"data-view\""));
+    // With a kernel behind it a page needs no orbits; otherwise it has those of all special points.
+    let none = Shown { space: 0, special: false, ..Shown::default() };
+    let (bare, amount) = html(&path, &none).expect("the run can be read");
+    assert_eq!((amount.solutions, bare.matches("id=\"data-special-").count()), (0, 0));
+    assert!(plain.matches("id=\"data-special-").count() >= 2);
     // The last value of each special point is the harmonic.
     let state =
         page.split("id=\"data-state\">").nth(1).and_then(|rest| rest.split("</script>").next()).expect("a state");

@@ -189,6 +189,29 @@ test("harmonics are axes, with the values of foldline table, and are saved with 
   assert.deepEqual(errors, []);
 });
 
+test("the line of a phase is interrupted where it passes 180 degrees", limit, async (t) => {
+  const model = '[parameters]\nOmega = 0.8\n[forcing]\nfrequency = "Omega"\n[states.x]\nequation = "v"\nrange = [-2, 2]\n[states.v]\nequation = "-x - 0.1*v + 0.1*cos(Omega*t)"\nrange = [-2, 2]\n[outputs]\nback = "-v"\n';
+  const text = 'model = "phase-model.toml"\n[[seed]]\nname = "start"\nattractor = "cycle"\n[[branch]]\nname = "main"\nfrom = "start"\nfree = "Omega"\nrange = [0.5, 2]\n';
+  writeFileSync(join(folder, "phase-model.toml"), model);
+  writeFileSync(join(folder, "phase.toml"), text);
+  const run = join(folder, "phase");
+  execFileSync(FOLDLINE, ["run", join(folder, "phase.toml"), "--out", run, "-q"], { stdio: "ignore" });
+  const { page } = await finishedPage(t, {}, run);
+  await page.selectOption('[aria-label="y axis"]', { label: "back_h1_phase [deg]" });
+  await page.waitForFunction(() => location.hash.includes("y=back_h1_phase"));
+  const { values, svg, height } = await page.evaluate(() => {
+    const { app, svg: picture } = window.foldline;
+    const branch = app.run.listed()[0];
+    const { top, bottom } = app.diagram.chart.box;
+    return { values: branch.places().map((place) => branch.value(place, app.diagram.qy)), svg: picture(), height: bottom - top };
+  });
+  // x lags by 0 to 180 degrees, so -v does by 90 to 270.
+  assert.ok(Math.max(...values) > 150 && Math.min(...values) < -150);
+  const lines = [...svg.matchAll(/<path d="(M[^"]*)" fill="none" stroke="[^"]*" stroke-width="2"/g)].map((own) => own[1].split(/[ML]/).slice(1).map((pair) => Number(pair.split(" ")[1])));
+  assert.ok(lines.length >= 2);
+  for (const ys of lines) for (let k = 1; k < ys.length; k += 1) assert.ok(Math.abs(ys[k] - ys[k - 1]) < height / 2);
+});
+
 test("a quantity that is in no list is shown by its name, and a wrong name says why", limit, async (t) => {
   const { page } = await finishedPage(t);
   await page.selectOption('[aria-label="y axis"]', { label: "by name …" });
