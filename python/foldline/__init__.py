@@ -32,6 +32,7 @@ from ._strobe import Strobe, strobe
 from ._sweeps import survey, sweep
 from ._symbols import where
 from ._uncertainty import Spread, Uncertainty, uncertainty
+from ._view import view
 
 try:
     __version__ = _version("foldline")
@@ -89,6 +90,7 @@ __all__ = [
     "survey",
     "sweep",
     "uncertainty",
+    "view",
     "where",
 ]
 

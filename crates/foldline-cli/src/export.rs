@@ -7,7 +7,7 @@ use crate::verbosity::report;
 use foldline::sensitivity::listed::entries;
 use foldline_store::export::{Export, ExportError, Format};
 use foldline_store::run_file::Part;
-use foldline_view::Amount;
+use foldline_view::{Amount, Shown};
 
 /// Writes a run in another format and reports the path.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
@@ -69,7 +69,7 @@ fn page(typed: &Typed) -> Result<Outcome, Failure> {
         let cure = format!("name a file, such as --out {}", out.join("run.html").display());
         return Err(Failure::typed(format!("--out {}: this is a folder", out.display()), cure));
     }
-    let (text, amount) = foldline_view::html(&typed.folder)?;
+    let (text, amount) = foldline_view::html(&typed.folder, &Shown::default())?;
     let failed = |error| Failure::from(foldline_view::Failure::Output(out.clone(), error));
     if let Some(folder) = out.parent().filter(|folder| !folder.as_os_str().is_empty()) {
         std::fs::create_dir_all(folder).map_err(failed)?;

@@ -10,7 +10,7 @@
 //! | what is computed? | `study`, `basins` |
 //! | how is it computed without the interpreter's lock, and interrupted? | `work`, `patience` |
 //! | what are the results? | `diagram`, `solution` |
-//! | how is it drawn? | `pictures` |
+//! | how is it drawn, and shown in a notebook? | `pictures`, `explorer` |
 //! | which exceptions report mistakes? | `failure` |
 
 mod basins;
@@ -18,6 +18,7 @@ mod bytes;
 mod cells;
 mod diagram;
 mod ensemble;
+mod explorer;
 mod failure;
 mod model;
 mod patience;
@@ -42,6 +43,8 @@ mod _native {
     use crate::diagram::Diagram;
     #[pymodule_export]
     use crate::ensemble::{Emitted, ensemble};
+    #[pymodule_export]
+    use crate::explorer::{Explored, page};
     #[pymodule_export]
     use crate::model::{Model, suggested};
     #[pymodule_export]

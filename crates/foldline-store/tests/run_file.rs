@@ -5,7 +5,8 @@ use foldline::diagram::{
     Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Recognition, Response, Responses,
     Search, Share, Shortfall, Solution, SpecialPoint, Trust,
 };
-use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
+use foldline::special::quantity::Quantity;
+use foldline_store::run_file::{Part, Reading, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};
 use num_complex::Complex64;
 use std::path::Path;
@@ -499,6 +500,61 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
+/// Values of quantities at the points of a branch, and what SQLite reads for them.
+fn values_of(folder: &Path, names: &[&str]) -> (Vec<[f64; 4]>, String) {
+    let quantities: Vec<Quantity> =
+        names.iter().map(|name| Quantity::named(name, &study().model).expect("there is such a quantity")).collect();
+    let mut found = Vec::new();
+    let reading = Reading::open(folder).unwrap();
+    let take = |position: i64, _, values: &[f64]| found.push([position as f64, values[0], values[1], values[2]]);
+    reading.each_value(1, [-1, 2], &quantities, &study().model, take).unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder)).unwrap();
+    let sql = "EXPLAIN QUERY PLAN SELECT position, unstable, average_bytes, mu, x_max, period FROM points
+               WHERE branch = 1 AND position BETWEEN -1 AND 2 ORDER BY position";
+    (found, connection.query_row(sql, [], |row| row.get(3)).unwrap())
+}
+
+#[test]
+fn diagrams_are_read_from_an_index_which_earlier_files_get_when_they_are_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    let bits = |values: &[[f64; 4]]| values.iter().map(|row| row.map(f64::to_bits)).collect::<Vec<_>>();
+    let names = ["mu", "r_max", "x_mean"];
+    let (values, plan) = values_of(folder.path(), &names);
+    assert!(plan.contains("USING COVERING INDEX points_in_diagrams"), "{plan}");
+    assert_eq!(values.iter().map(|row| row[0]).collect::<Vec<_>>(), [-1.0, 0.0, 1.0, 2.0]);
+    for row in &values {
+        let own = point(row[0] as i64, false);
+        assert_eq!(row[1].to_bits(), own.parameters[0].to_bits());
+    }
+    // A file of an earlier version has no index: the same numbers come from the rows.
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    connection.execute_batch("DROP INDEX points_in_diagrams").unwrap();
+    drop(connection);
+    let (older, plan) = values_of(folder.path(), &names);
+    assert!(!plan.contains("COVERING INDEX points_in_diagrams"), "{plan}");
+    assert_eq!(bits(&older), bits(&values));
+    let (resumed, _) = Recorder::resume(folder.path(), &study()).unwrap();
+    resumed.finish().unwrap();
+    let (resumed, plan) = values_of(folder.path(), &names);
+    assert!(plan.contains("USING COVERING INDEX points_in_diagrams"), "{plan}");
+    assert_eq!(bits(&resumed), bits(&values));
+}
+
+#[test]
+fn numbers_stand_before_profiles_so_that_they_are_read_without_them() {
+    let folder = tempfile::tempdir().unwrap();
+    Recorder::create(folder.path(), &study()).unwrap().finish().unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    for table in ["points", "special_points"] {
+        let mut statement = connection.prepare("SELECT name FROM pragma_table_info(?1) ORDER BY cid").unwrap();
+        let names: Vec<String> = statement.query_map([table], |row| row.get(0)).unwrap().map(Result::unwrap).collect();
+        assert_eq!(names[names.len() - 3..], ["solution_bytes", "mesh_bytes", "tangent_bytes"], "{table}");
+    }
+}
+
 /// Converts a file from version 10 to version 7.
 const WITHOUT_ERRORS: &str = "
     UPDATE special_points SET scalar_bytes = CAST(substr(scalar_bytes, 1, 80) AS BLOB), numbers_checksum = NULL;
@@ -511,6 +567,7 @@ const WITHOUT_ERRORS: &str = "
 
 /// Converts a file of version 4 to 7 to version 3, then to version 2.
 const WITHOUT_COUNTERS: &str = "
+    DROP INDEX points_in_diagrams;
     ALTER TABLE points DROP COLUMN average_bytes; ALTER TABLE special_points DROP COLUMN average_bytes;
     ALTER TABLE points DROP COLUMN forcing_periods; ALTER TABLE special_points DROP COLUMN forcing_periods;
     ALTER TABLE special_points DROP COLUMN normal_form;

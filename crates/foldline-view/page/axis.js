@@ -14,7 +14,9 @@ export class Axis {
 
   /** Even coordinate of a value; NaN if the axis cannot show it. */
   even(value) {
-    return this.log ? (value > 0 ? Math.log10(value) : NaN) : value;
+    const even = this.log ? (value > 0 ? Math.log10(value) : NaN) : value;
+    // An amplitude of zero has a level of -∞ dB.
+    return Number.isFinite(even) ? even : NaN;
   }
 
   value(even) {

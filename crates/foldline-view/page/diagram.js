@@ -151,6 +151,8 @@ export class Diagram {
 
   drawBranch(surface, x, y, branch, theme) {
     const { xs, ys, unstable, box, places } = this.path(branch);
+    const angles = [this.qx, this.qy].map((k) => this.run.about.quantities[k].class === "phase");
+    const turned = (k) => (angles[0] && Math.abs(xs[k] - xs[k - 1]) > 180) || (angles[1] && Math.abs(ys[k] - ys[k - 1]) > 180);
     if (box[1] < x.low || box[0] > x.high || box[3] < y.low || box[2] > y.high) return;
     const colour = branchColour(branch.colour, theme.dark);
     const styles = [{ stroke: colour, width: 2 }, { stroke: colour, width: 1.5, dash: [5, 4] }];
@@ -161,6 +163,11 @@ export class Diagram {
     };
     for (let k = 0; k < xs.length; k += 1) {
       const [a, b] = [x.pixelOfEven(xs[k]), y.pixelOfEven(ys[k])];
+      if (k > 0 && turned(k)) {
+        // -180° and 180° are one angle: the line ends at one and goes on at the other.
+        flush(unstable[k - 1]);
+        [px, py] = [[], []];
+      }
       const last = px.length - 1;
       const turn = k > 0 && unstable[k] !== unstable[k - 1];
       const close = last > 0 && Math.abs(a - px[last]) < FINE && Math.abs(b - py[last]) < FINE;

@@ -2,6 +2,7 @@
 
 import { isDark } from "./colours.js";
 import { Diagram, quantityLabel } from "./diagram.js";
+import { askForQuantity } from "./names.js";
 import { button, byId, choice, copied, make, still } from "./dom.js";
 import { listenToKeys, showKeys } from "./keys.js";
 import { BranchList, Log, showPoint, SpecialTable } from "./lists.js";
@@ -9,7 +10,7 @@ import { greek } from "./numbers.js";
 import { OrbitPanel, Solution } from "./orbit.js";
 import { Run } from "./run.js";
 import { csvText, saveCsv, savePage, savePdf, savePng, saveSvg } from "./save.js";
-import { savedView, source } from "./source.js";
+import { notebook, savedView, source } from "./source.js";
 import { MultipliersPanel, SpectrumPanel } from "./spectrum.js";
 import { Desk, Pace, showExamples } from "./study.js";
 
@@ -65,13 +66,15 @@ class App {
     this.keys();
     await this.run.refresh();
     const asked = new URLSearchParams((location.hash || savedView()).slice(1));
-    const named = (key, fallback) => {
-      const found = this.run.quantity(asked.get(key) ?? "");
-      return found >= 0 ? found : fallback;
+    const named = async (key, fallback) => {
+      const name = asked.get(key) ?? "";
+      const found = this.run.quantity(name);
+      if (found >= 0 || !name || !this.run.source.live) return found >= 0 ? found : fallback;
+      return this.run.add(name).catch(() => fallback);
     };
     const defaults = this.run.defaults();
     this.log = [asked.get("logx") === "1", asked.get("logy") === "1"];
-    await this.axes(named("x", defaults.x), named("y", defaults.y));
+    await this.axes(await named("x", defaults.x), await named("y", defaults.y));
     this.recall(asked);
     this.early = this.run.listed().length === 0 && !asked.has("x");
     if (this.run.state.draft) this.drafted();
@@ -92,6 +95,8 @@ class App {
 
   /** Puts axes, place and view into the address, so that it can be kept. */
   remember() {
+    // A page in a frame has no address of its own.
+    if (location.protocol === "about:") return;
     clearTimeout(this.remembering);
     this.remembering = setTimeout(() => {
       const { quantities } = this.run.about;
@@ -210,7 +215,7 @@ class App {
     const element = byId("progress");
     const [done, of] = state.requests ?? [0, 0];
     const short = done < of || state.shortfalls.length > 0 || state.branches.some((own) => own.ends.some((end) => end && !end.complete));
-    const said = !from.live ? "saved page" : state.draft ? "not computed" : !this.connected ? "no connection: foldline view has ended" : state.running ? "running" : state.code === null || state.code === 0 ? "complete" : state.code === 3 ? "incomplete" : "stopped";
+    const said = !from.live ? (notebook() ? "notebook" : "saved page") : state.draft ? "not computed" : !this.connected ? "no connection: foldline view has ended" : state.running ? "running" : state.code === null || state.code === 0 ? "complete" : state.code === 3 ? "incomplete" : "stopped";
     const now = said === "complete" && short ? "incomplete" : said;
     element.className = now === "running" ? "running" : ["incomplete", "stopped"].includes(now) || !this.connected ? "short" : "";
     // Branches, curves, surveys and sweeps of the study; how long each takes is not known beforehand.
@@ -225,8 +230,17 @@ class App {
   // Axes.
 
   async axes(qx, qy) {
-    await this.run.ensure([qx, qy, this.run.quantity("period")]);
+    const computed = [qx, qy].filter((k) => this.run.about.quantities[k].profile && !this.run.loaded.has(k));
+    if (computed.length > 0) this.tell(`Computing ${computed.map((k) => this.run.about.quantities[k].name).join(" and ")} from the orbits …`);
+    try {
+      await this.run.ensure([qx, qy, this.run.quantity("period")]);
+    } catch (error) {
+      this.tell(`The points cannot be read: ${error.message}`);
+      this.controls();
+      return;
+    }
     this.diagram.setAxes(qx, qy, this.log[0], this.log[1]);
+    if (computed.length > 0) this.tell(this.selected ? this.diagram.line(this.selected) : "");
     this.controls();
     this.show();
     this.remember();
@@ -236,11 +250,15 @@ class App {
     const { about } = this.run;
     const groups = new Map();
     about.quantities.forEach((own, k) => {
-      const name = { parameter: "parameters", min: "smallest value", max: "largest value", mean: "mean", rms: "root mean square", integral: "integral" }[own.class] ?? "solution";
+      const name = { parameter: "parameters", min: "smallest value", max: "largest value", mean: "mean", rms: "root mean square", integral: "integral", amplitude: "amplitude of harmonic", decibel: "in decibels", phase: "phase", ratio: "ratio" }[own.class] ?? "solution";
       groups.set(name, [...(groups.get(name) ?? []), [String(k), quantityLabel(own)]]);
     });
+    if (this.run.source.live) groups.set("", [["name", "by name …"]]);
     const { qx, qy } = this.diagram;
-    const axis = (label, own, set) => make("label", {}, label, choice(`${label} axis`, [...groups], String(own), set));
+    const axis = (label, own, set) => {
+      const named = () => askForQuantity(label, this.run, set, () => this.controls());
+      return make("label", {}, label, choice(`${label} axis`, [...groups], String(own), (value) => (value === "name" ? named() : set(value))));
+    };
     const log = (k) => button("log", `${["Horizontal", "Vertical"][k]} axis logarithmic`, () => {
       this.log[k] = !this.log[k];
       this.axes(qx, qy);
@@ -312,7 +330,9 @@ class App {
   theme() {
     const press = byId("theme");
     const system = matchMedia("(prefers-color-scheme: dark)");
-    let chosen = null;
+    // A notebook has colours of its own.
+    const dark = notebook()?.dark;
+    let chosen = dark === undefined ? null : dark ? "dark" : "light";
     const show = () => {
       document.documentElement.dataset.theme = chosen ?? (system.matches ? "dark" : "light");
       press.textContent = isDark() ? "Light" : "Dark";

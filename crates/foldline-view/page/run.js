@@ -104,6 +104,9 @@ export class Run {
     this.epoch = 0;
     this.cursor = 0;
     this.loaded = new Set();
+    /** @type {Map<number, Map<string, number>>} Values of special points by quantity, if they follow from profiles. */
+    this.profiles = new Map();
+    this.mark = "";
     this.queue = Promise.resolve();
     this.changes = 0;
   }
@@ -132,6 +135,7 @@ export class Run {
       this.take(state);
       // Before the axes are known no column is wanted.
       if (this.loaded.size > 0) await this.fetchPoints([...this.loaded]);
+      await this.complete();
     });
   }
 
@@ -145,6 +149,38 @@ export class Run {
       await this.fetchPoints(missing, last);
       missing.forEach((k) => this.loaded.add(k));
       await this.fetchPoints([...this.loaded]);
+      await this.complete();
+    });
+  }
+
+  /** Fetches the values of special points that follow from their profiles: the state does not have them. */
+  async complete() {
+    const { special } = this.state;
+    const mark = `${this.epoch}:${special.length}`;
+    // A special point that is found later may come before others of its branch.
+    if (mark !== this.mark) this.profiles.clear();
+    this.mark = mark;
+    const missing = [...this.loaded].filter((k) => this.about.quantities[k]?.profile && !this.profiles.has(k));
+    for (let from = 0; from < missing.length; from += COLUMNS) {
+      const found = await this.source.special(missing.slice(from, from + COLUMNS));
+      if (!found) return;
+      const [branches, indices, ...values] = found.columns;
+      found.header.columns.forEach((k, at) => this.profiles.set(k, new Map(Array.from(values[at], (value, row) => [`${branches[row]}:${indices[row]}`, value]))));
+    }
+    if (this.profiles.size === 0) return;
+    for (const own of [...special, ...[...this.branches.values()].flatMap((branch) => branch.special)]) {
+      for (const [k, values] of this.profiles) own.values[k] = values.get(`${own.branch}:${own.index}`) ?? NaN;
+    }
+    for (const branch of this.branches.values()) branch.touch();
+    this.changes += 1;
+  }
+
+  /** Adds a quantity by its name, and returns its index. */
+  add(name) {
+    return this.inTurn(async () => {
+      const { index } = await this.source.order("quantity", { name });
+      await this.begin();
+      return index;
     });
   }
 

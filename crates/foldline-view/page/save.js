@@ -26,7 +26,7 @@ const data = (id) => `<${TAG} type="application/json" id="data-${id}">`;
 
 /** Saves the whole page with its data, so that it opens without a server; it shows the view of now. */
 export async function savePage(run) {
-  const page = await run.source.page();
+  const page = await run.source.page([...run.loaded].filter((k) => run.about.quantities[k].profile));
   const view = `${data("view")}${JSON.stringify(location.hash).replaceAll("<", "\\u003c")}</${TAG}>\n`;
   const study = run.about.study.file.split(/[\\/]/).pop().replace(/\.toml$/, "");
   download(`${study.replace(/[^\w.-]+/g, "_")}.html`, page.replace(data("run"), (found) => view + found), "text/html");

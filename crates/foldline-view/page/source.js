@@ -7,8 +7,9 @@
  *   run: () => Promise<any>,
  *   state: () => Promise<any>,
  *   points: (epoch: number, since: number, columns: number[]) => Promise<Frame>,
+ *   special: (columns: number[]) => Promise<Frame | null>,
  *   solution: (branch: number, position: number, special: number) => Promise<Frame | null>,
- *   page: () => Promise<string>,
+ *   page: (columns: number[]) => Promise<string>,
  *   order: (what: string, body: any) => Promise<any>,
  *   listen: (heard: (notice: any) => void, lost: (isLost: boolean) => void) => void,
  * }} Source
@@ -35,6 +36,7 @@ function frameOf(buffer, split) {
 }
 
 const ofPoints = (header) => (header.restart ? [] : new Array(3 + header.columns.length).fill(header.rows));
+const ofSpecial = (header) => new Array(2 + header.columns.length).fill(header.rows);
 const ofSolution = (header) => {
   if (header.rows === 0) return [];
   const orbit = new Array(1 + header.channels).fill(header.rows);
@@ -58,13 +60,17 @@ function server() {
       const answer = await get(`/api/points?epoch=${epoch}&since=${since}&columns=${columns.join(",")}`);
       return frameOf(await answer.arrayBuffer(), ofPoints);
     },
+    special: async (columns) => {
+      const answer = await get(`/api/special?columns=${columns.join(",")}`);
+      return answer && frameOf(await answer.arrayBuffer(), ofSpecial);
+    },
     solution: async (branch, position, special) => {
       const place = special >= 0 ? `special=${special}` : `position=${position}`;
       const answer = await get(`/api/solution?branch=${branch}&${place}`);
       return answer && frameOf(await answer.arrayBuffer(), ofSolution);
     },
-    page: async () => {
-      const answer = await fetch("/api/export", { credentials: "same-origin" });
+    page: async (columns) => {
+      const answer = await fetch(`/api/export?columns=${columns.join(",")}`, { credentials: "same-origin" });
       if (!answer.ok) throw new Error(answer.status === 404 ? "there are no results yet" : "the run is too large to save from here; `foldline export DIR --format html` writes it");
       return answer.text();
     },
@@ -121,9 +127,13 @@ function embedded() {
       const chosen = columns.map((k) => found.columns[3 + found.header.columns.indexOf(k)]);
       return { header: { ...found.header, epoch, columns }, columns: [...found.columns.slice(0, 3), ...chosen] };
     },
+    // The special points of a page have all their values.
+    special: async () => null,
     solution: async (branch, position, special) => {
       const own = bytes(special >= 0 ? `special-${branch}-${special}` : `solution-${branch}-${position}`);
       if (own) return frameOf(own, ofSolution);
+      const asked = await notebook()?.solution(branch, position, special);
+      if (asked) return frameOf(asked, ofSolution);
       // A file has the solutions of some points only: the closest one is shown, and its position said.
       for (let away = 1; away < 10000; away += 1) {
         for (const other of [position - away, position + away]) {
@@ -147,6 +157,14 @@ function embedded() {
 export function savedView() {
   const text = document.getElementById("data-view")?.textContent;
   return text ? JSON.parse(text) : "";
+}
+
+/**
+ * The notebook that shows this page in a frame, if there is one: it can be asked for any solution.
+ * @returns {{solution: (branch: number, position: number, special: number) => Promise<ArrayBuffer | null>, dark?: boolean} | null}
+ */
+export function notebook() {
+  return window.frameElement?.foldline ?? null;
 }
 
 /** The source of this page. */

@@ -1,5 +1,6 @@
 //! Description of a run for the page, as JSON.
 
+use crate::axes::Axis;
 use foldline::contract::VectorField;
 use foldline::diagram::{Kind, Origin};
 use foldline::model::Model;
@@ -15,13 +16,14 @@ use std::path::Path;
 const SCHEMA: u32 = 1;
 
 /// Model, study and quantities.
-pub(crate) fn described(study: &Study, quantities: &[Quantity], folder: &Path) -> Value {
+pub(crate) fn described(study: &Study, axes: &[Axis], folder: &Path) -> Value {
     let model = &study.model;
-    let all = Quantity::names(model);
-    let named = quantities.iter().zip(&all).map(|(quantity, name)| {
+    let named = axes.iter().map(|Axis { name, quantity }| {
         let (base, unit, class, text) = parts(*quantity, model);
         let determined = matches!(*quantity, Quantity::Parameter(k) if model.determined().contains(&k));
-        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text, "determined": determined })
+        let (base, profile) = (if base.is_empty() { name } else { base }, quantity.needs_profile());
+        json!({ "name": name, "base": base, "unit": unit, "class": class, "description": text, "determined": determined,
+            "profile": profile })
     });
     let channels = model.states.iter().map(|s| (&s.name, &s.unit, &s.description, "state"));
     let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description, "output"));
@@ -65,14 +67,19 @@ fn parts(quantity: Quantity, model: &Model) -> (&str, &str, &'static str, &str) 
         Quantity::Iterate(k, _) => ("iterate", variable(k)),
         Quantity::At(k, place) => (if f64::from_bits(place) == 0.0 { "start" } else { "end" }, variable(k)),
         Quantity::Frequency => ("frequency", Some(("frequency", "", "1/period"))),
-        _ => ("harmonic", None),
+        Quantity::Rotation => ("rotation", Some(("rotation", "", "rotation number of a torus"))),
+        Quantity::Decibels(_) | Quantity::RatioDecibels(..) => ("decibel", Some(("", "dB", "20 log₁₀ of the value"))),
+        Quantity::Ratio(..) => ("ratio", None),
+        Quantity::Difference(..) => ("phase", Some(("", "deg", "difference of two phases"))),
+        Quantity::Of(_) if quantity.is_phase() => ("phase", Some(("", "deg", "phase lag of a harmonic"))),
+        Quantity::Of(_) => ("amplitude", Some(("", quantity.unit(model), "amplitude of a harmonic"))),
     };
     let (name, unit, text) = found.unwrap_or_default();
     (name, unit, class, text)
 }
 
 /// Branches, special points, ends, notes and responses, in the order of the tables of `foldline table`.
-pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[Quantity]) -> Value {
+pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, axes: &[Axis]) -> Value {
     let numbers: HashMap<&str, i64> = spans.iter().map(|span| (span.name.as_str(), span.number)).collect();
     let reach: HashMap<i64, [i64; 2]> = spans.iter().filter_map(|span| Some((span.number, span.reach?))).collect();
     let planned = names(&study.plan);
@@ -106,7 +113,7 @@ pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[
             "origin": origin, "parent": parent, "reach": reach.get(&number), "ends": [end(0), end(1)],
         }));
         for (index, own) in branch.special.iter().enumerate() {
-            let values: Vec<Option<f64>> = quantities.iter().map(|quantity| quantity.of(&own.point)).collect();
+            let values: Vec<Option<f64>> = axes.iter().map(|axis| axis.quantity.of(&own.point)).collect();
             special.push(json!({
                 "branch": number, "index": index, "kind": own.kind.name(), "position": own.point.position,
                 "values": values, "before": own.unstable_before, "after": own.unstable_after, "error": own.error,
@@ -116,7 +123,7 @@ pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[
     }
     let responses = diagram.responses.iter().map(|set| {
         let rows = set.responses.iter().map(|own| {
-            let values = quantities.iter().map(|quantity| match *quantity {
+            let values = axes.iter().map(|axis| match axis.quantity {
                 Quantity::Parameter(k) => own.parameters.get(k).copied(),
                 Quantity::Smallest(k) => own.ranges.get(k).map(|range| range[0]),
                 Quantity::Largest(k) => own.ranges.get(k).map(|range| range[1]),

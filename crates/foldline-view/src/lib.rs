@@ -11,6 +11,7 @@
 //! **Departures.** No web framework: twelve paths need no router
 //! (docs/decisions/0037-explorer.md).
 
+mod axes;
 mod body;
 mod browser;
 mod describe;
@@ -29,7 +30,8 @@ mod watch;
 
 pub use browser::open as open_browser;
 pub use desk::{Desk, Example, Files, Program};
-pub use html::{Amount, html};
+pub use html::{Amount, Shown, html, solution};
+pub use orbit::Place;
 pub use page::script;
 pub use server::{Server, Stop};
 pub use watch::{Failure, Watch};

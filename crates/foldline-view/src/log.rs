@@ -9,6 +9,8 @@ use std::collections::HashMap;
 
 /// Largest number of points in one answer.
 pub(crate) const ROWS: u64 = 20_000;
+/// Largest number of points in one answer that needs their profiles, usually a hundred times as many bytes.
+pub(crate) const PROFILES: u64 = 500;
 
 /// Stretches of points in the order in which they were seen.
 #[derive(Debug, Default)]
@@ -74,9 +76,9 @@ impl Log {
         }
     }
 
-    /// Stretches from a cursor on, at most [`ROWS`] points in all.
-    pub(crate) fn since(&self, cursor: u64) -> Vec<Stretch> {
-        let (mut found, mut left) = (Vec::new(), ROWS);
+    /// Stretches from a cursor on, at most `most` points in all.
+    pub(crate) fn since(&self, cursor: u64, most: u64) -> Vec<Stretch> {
+        let (mut found, mut left) = (Vec::new(), most);
         let from = self.stretches.partition_point(|stretch| stretch.first + stretch.points() <= cursor);
         for stretch in &self.stretches[from..] {
             let skipped = cursor.saturating_sub(stretch.first) as i64;
@@ -108,11 +110,11 @@ mod tests {
     fn branches_that_grow_at_both_ends_are_passed_on_once() {
         let mut log = Log::default();
         log.grow(&[span(1, [0, 2])]);
-        assert_eq!(positions(&log.since(0)), [(1, 0), (1, 1), (1, 2)]);
+        assert_eq!(positions(&log.since(0, ROWS)), [(1, 0), (1, 1), (1, 2)]);
         log.grow(&[span(1, [-1, 3]), span(2, [0, 0])]);
-        assert_eq!(positions(&log.since(3)), [(1, -1), (1, 3), (2, 0)]);
-        assert_eq!(positions(&log.since(4)), [(1, 3), (2, 0)]);
-        assert_eq!(log.since(6).len(), 0);
+        assert_eq!(positions(&log.since(3, ROWS)), [(1, -1), (1, 3), (2, 0)]);
+        assert_eq!(positions(&log.since(4, ROWS)), [(1, 3), (2, 0)]);
+        assert_eq!(log.since(6, ROWS).len(), 0);
         assert_eq!((log.epoch(), log.points()), (1, 6));
         log.grow(&[span(1, [-1, 3]), span(2, [0, 0])]);
         assert_eq!((log.epoch(), log.points()), (1, 6));
@@ -133,9 +135,9 @@ mod tests {
         let mut log = Log::default();
         let long = ROWS as i64 + 10;
         log.grow(&[span(1, [0, 5]), span(2, [0, long])]);
-        let first = positions(&log.since(0));
+        let first = positions(&log.since(0, ROWS));
         assert_eq!(first.len() as u64, ROWS);
-        let rest = positions(&log.since(ROWS));
+        let rest = positions(&log.since(ROWS, ROWS));
         assert_eq!(first.len() as u64 + rest.len() as u64, log.points());
         assert_eq!(rest[0], (2, ROWS as i64 - 6));
     }

@@ -6,15 +6,15 @@
 //!
 //! **Fails when** an orbit has structure finer than T/S: its harmonics are aliased.
 
+use crate::axes::Axis;
 use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::diagram::{Cycle, Point, Solution};
 use foldline::model::Model;
-use foldline::special::quantity::Quantity;
 use serde_json::{Value, json};
 
 /// Place of a point on its branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Place {
+pub enum Place {
     /// Position of an accepted point.
     Position(i64),
     /// Index of a special point.
@@ -33,8 +33,8 @@ const HIGHEST: usize = 40;
 /// Returns header and columns of a solution. For a cycle these are the time, every state and output along the orbit,
 /// then real and imaginary parts of the harmonics of each, and the switching functions along the orbit, which are
 /// positive on one side of a contact. For an equilibrium there is one row.
-pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) -> (Value, Vec<Vec<f64>>) {
-    let values: Vec<Option<f64>> = quantities.iter().map(|quantity| quantity.of(point)).collect();
+pub(crate) fn solution(model: &Model, axes: &[Axis], point: &Point) -> (Value, Vec<Vec<f64>>) {
+    let values: Vec<Option<f64>> = axes.iter().map(|axis| axis.quantity.of(point)).collect();
     let trust = point.trust;
     // A boundary-value problem has no multipliers.
     let known = if model.conditions() == [0, 0] { &point.spectrum[..] } else { &[] };

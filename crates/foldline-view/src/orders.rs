@@ -5,6 +5,7 @@
 //! | `/api/check` | `study` or `model`, a text | its mistakes, with line and column |
 //! | `/api/act` | `branch`, `position` or `special`, `action`, perhaps `free` | the longer study, and which of its lines are new |
 //! | `/api/verify` | `branch`, `position` or `special` | the differences to an independent computation, with the errors stated |
+//! | `/api/quantity` | `name` | the index of this quantity, which is added to those of the run |
 //! | `/api/study` | `before`, `text` | nothing; the run goes on with the text |
 //! | `/api/new` | `model`, `study`, two texts | nothing; they are computed from the beginning, in a new folder |
 //! | `/api/example` | `index` | nothing; the page shows the example, of which nothing is computed |
@@ -21,8 +22,17 @@ use hyper::StatusCode;
 use serde_json::{Value, json};
 
 /// Paths of these requests.
-const PATHS: [&str; 8] =
-    ["/api/check", "/api/act", "/api/verify", "/api/study", "/api/new", "/api/example", "/api/stop", "/api/resume"];
+const PATHS: [&str; 9] = [
+    "/api/check",
+    "/api/act",
+    "/api/verify",
+    "/api/quantity",
+    "/api/study",
+    "/api/new",
+    "/api/example",
+    "/api/stop",
+    "/api/resume",
+];
 /// Largest body, in bytes.
 pub(crate) const LARGEST: u64 = 1 << 20;
 
@@ -50,6 +60,10 @@ pub(crate) fn carried_out(path: &str, body: &[u8], watch: &Watch, desk: Option<&
         ("/api/verify", _) => match place(&body) {
             Some((branch, place)) => verified(watch, branch, place),
             None => return bad("the point is missing"),
+        },
+        ("/api/quantity", _) => match text("name") {
+            Some(name) => watch.add(name).map(|index| json!({ "index": index })).map_err(Refused::Because),
+            None => return bad("`name` is missing"),
         },
         (_, None) => Err(Refused::Because(watch.why_not().unwrap_or_default())),
         ("/api/study", Some(desk)) => match (text("before"), text("text")) {

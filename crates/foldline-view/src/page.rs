@@ -7,7 +7,7 @@
 use std::sync::LazyLock;
 
 /// Modules of the script, each after those that it imports.
-const MODULES: [&str; 18] = [
+const MODULES: [&str; 19] = [
     include_str!("../page/numbers.js"),
     include_str!("../page/colours.js"),
     include_str!("../page/dom.js"),
@@ -25,6 +25,7 @@ const MODULES: [&str; 18] = [
     include_str!("../page/study.js"),
     include_str!("../page/save.js"),
     include_str!("../page/keys.js"),
+    include_str!("../page/names.js"),
     include_str!("../page/main.js"),
 ];
 

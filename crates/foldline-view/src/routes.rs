@@ -6,15 +6,16 @@
 //! | `/api/run` | model, study and quantities (JSON) |
 //! | `/api/state` | branches, special points, ends, notes (JSON) |
 //! | `/api/points?epoch=E&since=N&columns=K,K,...` | points from cursor N on ([`frame`](crate::frame)) |
+//! | `/api/special?columns=K,K,...` | values at all special points (frame) |
 //! | `/api/solution?branch=B&position=P` or `&special=K` | one solution (frame) |
-//! | `/api/export` | the run as one page (HTML, to be saved) |
+//! | `/api/export?columns=K,K,...` | the run as one page with these harmonics (HTML, to be saved) |
 //! | `/api/events` | `grew` whenever something has changed (server-sent events) |
 //! | POST | see [`orders`](crate::orders) |
 
 use crate::body::{Answer, First, first};
 use crate::desk::Desk;
 use crate::gate::{Entry, Gate};
-use crate::html::html;
+use crate::html::{Shown, html};
 use crate::orbit::Place;
 use crate::orders;
 use crate::page;
@@ -157,9 +158,17 @@ impl Routes {
         match path {
             "/api/run" => Ok(Asked::Run),
             "/api/state" => Ok(Asked::State),
-            "/api/export" => Ok(Asked::Export),
+            "/api/export" => {
+                let axes = self.watch.axes();
+                let columns = query.indices("columns", axes.len(), axes.len()).ok_or(bad)?;
+                Ok(Asked::Export(columns.iter().filter_map(|k| axes.get(*k)).map(|own| own.name.clone()).collect()))
+            }
+            "/api/special" => {
+                let columns = query.indices("columns", self.watch.axes().len(), COLUMNS).ok_or(bad)?;
+                Ok(Asked::Special { columns })
+            }
             "/api/points" => {
-                let columns = query.indices("columns", self.watch.quantities(), COLUMNS).ok_or(bad)?;
+                let columns = query.indices("columns", self.watch.axes().len(), COLUMNS).ok_or(bad)?;
                 Ok(Asked::Points { epoch: natural("epoch")?, since: natural("since")?, columns })
             }
             "/api/solution" => {
@@ -227,9 +236,20 @@ impl Watching {
 enum Asked {
     Run,
     State,
-    Export,
-    Points { epoch: u64, since: u64, columns: Vec<usize> },
-    Solution { branch: i64, place: Place },
+    /// Names of harmonics.
+    Export(Vec<String>),
+    Special {
+        columns: Vec<usize>,
+    },
+    Points {
+        epoch: u64,
+        since: u64,
+        columns: Vec<usize>,
+    },
+    Solution {
+        branch: i64,
+        place: Place,
+    },
 }
 
 impl Asked {
@@ -239,10 +259,11 @@ impl Asked {
             Asked::Run => Ok((JSON, watch.description().to_string().into_bytes())),
             Asked::State => Ok((JSON, watch.state().into_bytes())),
             // Not as a document: it would have the origin of the server.
-            Asked::Export => match html(&watch.folder()) {
+            Asked::Export(axes) => match html(&watch.folder(), &Shown { axes, ..Shown::default() }) {
                 Ok((page, _)) => Ok((BYTES, page.into_bytes())),
                 Err(_) => Err(StatusCode::NOT_FOUND),
             },
+            Asked::Special { columns } => Ok((BYTES, watch.special(&columns).map_err(failed)?)),
             Asked::Points { epoch, since, columns } => {
                 Ok((BYTES, watch.points(epoch, since, &columns).map_err(failed)?))
             }

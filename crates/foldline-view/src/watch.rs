@@ -3,16 +3,18 @@
 //! **Idea.** The file says which positions each branch has; `log` numbers them in the order in which they were first
 //! seen. The numbers of the points stay in the file, which is opened for each look and closed at once (`foldline_store::run_file`).
 
+use crate::axes::{self, Axis};
 use crate::describe::{described, state};
 use crate::frame::frame;
-use crate::log::{Log, Stretch};
+use crate::log::{Log, PROFILES, ROWS, Stretch};
 use crate::orbit::{Place, solution};
 use foldline::diagram::{Branch, Diagram, Kind, Point};
 use foldline::explore::System;
+use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 use foldline::verify::{Verified, verify};
 use foldline_store::diagnostic::Diagnostic;
-use foldline_store::run_file::{Part, Reading, RunFileError, is_written, path_in};
+use foldline_store::run_file::{Part, Reading, RunFileError, Span, is_written, path_in};
 use foldline_store::study_file::{Study, parse_study_of_run};
 use serde_json::{Value, json};
 use std::fmt;
@@ -73,7 +75,7 @@ struct Growing {
     study: Arc<Study>,
     /// Number of texts of the study seen.
     texts: u64,
-    quantities: Arc<[Quantity]>,
+    axes: Arc<[Axis]>,
     /// Number of changes seen.
     version: u64,
     log: Log,
@@ -109,28 +111,33 @@ impl Watch {
     /// # Errors
     /// If there is no run, or its file, study or model cannot be read.
     pub fn open(folder: &Path) -> Result<Watch, Failure> {
+        Watch::opened(folder, axes::offered)
+    }
+
+    /// Opens the run in a folder with the quantities that `axes` returns.
+    pub(crate) fn opened(folder: &Path, axes: impl Fn(&Model) -> Vec<Axis>) -> Result<Watch, Failure> {
         let reading = Reading::open(folder)?;
         let run = reading.recorded(Part::Special)?;
         let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
         let study = Arc::new(study.map_err(Failure::Study)?);
-        let quantities = quantities_of(&study);
-        let watch = Watch::of(folder, study, quantities);
+        let axes = axes(&study.model);
+        let watch = Watch::of(folder, study, axes.into());
         watch.look()?;
         Ok(watch)
     }
 
     /// Study of which nothing has been computed yet; the run will be in a folder.
     pub fn draft(folder: &Path, study: Study) -> Watch {
-        let quantities = quantities_of(&study);
-        Watch::of(folder, Arc::new(study), quantities)
+        let axes = axes::offered(&study.model);
+        Watch::of(folder, Arc::new(study), axes.into())
     }
 
-    fn of(folder: &Path, study: Arc<Study>, quantities: Arc<[Quantity]>) -> Watch {
+    fn of(folder: &Path, study: Arc<Study>, axes: Arc<[Axis]>) -> Watch {
         let growing = Growing {
             folder: folder.to_path_buf(),
             study,
             texts: 1,
-            quantities,
+            axes,
             version: 0,
             log: Log::default(),
             state: NOTHING.into(),
@@ -151,7 +158,7 @@ impl Watch {
     pub(crate) fn turn_to(&self, folder: &Path, study: Study) {
         let mut growing = self.growing();
         growing.folder = folder.to_path_buf();
-        growing.quantities = quantities_of(&study);
+        growing.axes = axes::offered(&study.model).into();
         growing.study = Arc::new(study);
         growing.texts += 1;
         growing.version += 1;
@@ -233,7 +240,7 @@ impl Watch {
         }
         (growing.written, growing.code) = (written, code);
         let study = Arc::clone(&growing.study);
-        let mut state = state(run, &spans, &study, &growing.quantities);
+        let mut state = state(run, &spans, &study, &growing.axes);
         state["running"] = written.into();
         state["code"] = code.into();
         state["points"] = growing.log.points().into();
@@ -269,8 +276,8 @@ impl Watch {
 
     /// Model, study and quantities, which do not change while the run grows.
     pub(crate) fn description(&self) -> Value {
-        let (study, quantities) = self.about();
-        described(&study, &quantities, &self.folder())
+        let (study, axes) = self.about();
+        described(&study, &axes, &self.folder())
     }
 
     /// Branches, special points, ends and notes.
@@ -279,13 +286,27 @@ impl Watch {
         format!("{{\"epoch\":{},\"version\":{},\"state\":{}}}", growing.log.epoch(), growing.version, growing.state)
     }
 
-    fn about(&self) -> (Arc<Study>, Arc<[Quantity]>) {
+    fn about(&self) -> (Arc<Study>, Arc<[Axis]>) {
         let growing = self.growing();
-        (Arc::clone(&growing.study), Arc::clone(&growing.quantities))
+        (Arc::clone(&growing.study), Arc::clone(&growing.axes))
     }
 
-    pub(crate) fn quantities(&self) -> usize {
-        self.growing().quantities.len()
+    pub(crate) fn axes(&self) -> Arc<[Axis]> {
+        Arc::clone(&self.growing().axes)
+    }
+
+    /// Adds a quantity by its name, and returns its index.
+    ///
+    /// # Errors
+    /// If there is no such quantity, or too many were added.
+    pub(crate) fn add(&self, name: &str) -> Result<usize, String> {
+        let mut growing = self.growing();
+        let mut all = growing.axes.to_vec();
+        let index = axes::add(&mut all, name, &growing.study.model)?;
+        growing.axes = all.into();
+        // The state, which has the values of special points, is that of the longer list.
+        growing.stamp = None;
+        Ok(index)
     }
 
     /// Returns a frame of the points from a cursor on: branch, position, number of unstable eigenvalues or multipliers,
@@ -295,14 +316,16 @@ impl Watch {
     /// If the file cannot be read.
     pub(crate) fn points(&self, epoch: u64, since: u64, columns: &[usize]) -> Result<Vec<u8>, RunFileError> {
         let (study, all) = self.about();
+        let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k)).map(|own| own.quantity).collect();
+        let profiles = quantities.iter().any(|quantity| quantity.needs_profile());
         let (wanted, now, last) = {
             let growing = self.growing();
-            (growing.log.since(since), growing.log.epoch(), growing.log.points())
+            let most = if profiles { PROFILES } else { ROWS };
+            (growing.log.since(since, most), growing.log.epoch(), growing.log.points())
         };
         if now != epoch {
             return Ok(frame(&json!({ "restart": true, "epoch": now }), &[]));
         }
-        let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k).copied()).collect();
         let mut found = vec![Vec::new(); 3 + quantities.len()];
         if wanted.is_empty() {
             // There may be no file yet.
@@ -312,10 +335,17 @@ impl Watch {
         let reading = Reading::open(&self.folder())?;
         for Stretch { branch, reach, .. } in &wanted {
             let before = found[0].len() as u64;
-            reading.each_value(*branch, *reach, &quantities, &study.model, |position, unstable, values| {
+            let mut take = |position: i64, unstable: i64, values: &[f64]| {
                 let first = [*branch as f64, position as f64, unstable as f64];
                 found.iter_mut().zip(first.iter().chain(values)).for_each(|(column, value)| column.push(*value));
-            })?;
+            };
+            if profiles {
+                reading.each_point_in(*branch, *reach, |point| {
+                    take(point.position, point.unstable as i64, &values_on(point, &quantities, &study.model));
+                })?;
+            } else {
+                reading.each_value(*branch, *reach, &quantities, &study.model, take)?;
+            }
             if found[0].len() as u64 - before != (reach[1] - reach[0] + 1) as u64 {
                 // Points were removed since the last look: the next one begins an epoch.
                 return Ok(frame(&json!({ "restart": true, "epoch": now }), &[]));
@@ -327,19 +357,39 @@ impl Watch {
         Ok(frame(&header, &found))
     }
 
+    /// Returns a frame of all special points: branch, index on the branch, and the columns asked for, which may need
+    /// their profiles.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub(crate) fn special(&self, columns: &[usize]) -> Result<Vec<u8>, RunFileError> {
+        let (study, all) = self.about();
+        let quantities: Vec<Quantity> = columns.iter().filter_map(|k| all.get(*k)).map(|own| own.quantity).collect();
+        let mut found = vec![Vec::new(); 2 + quantities.len()];
+        let reading = Reading::open(&self.folder())?;
+        for Span { number, .. } in reading.spans()? {
+            reading.each_special_point(number, |index, special| {
+                let first = [number as f64, index as f64];
+                let values = values_on(&special.point, &quantities, &study.model);
+                found.iter_mut().zip(first.iter().chain(&values)).for_each(|(column, value)| column.push(*value));
+            })?;
+        }
+        Ok(frame(&json!({ "columns": columns, "rows": found[0].len() }), &found))
+    }
+
     /// Returns a frame of one solution; `None` if there is no such point.
     ///
     /// # Errors
     /// If the file cannot be read.
     pub(crate) fn solution(&self, branch: i64, place: Place) -> Result<Option<Vec<u8>>, RunFileError> {
-        let (study, quantities) = self.about();
+        let (study, axes) = self.about();
         let reading = Reading::open(&self.folder())?;
         let point = match place {
             Place::Position(position) => reading.point(branch, position)?,
             Place::Special(index) => reading.special_point(branch, index)?.map(|special| special.point),
         };
         Ok(point.map(|point| {
-            let (header, columns) = solution(&study.model, &quantities, &point);
+            let (header, columns) = solution(&study.model, &axes, &point);
             frame(&header, &columns)
         }))
     }
@@ -411,9 +461,9 @@ impl Growing {
     }
 }
 
-fn quantities_of(study: &Study) -> Arc<[Quantity]> {
-    let names = Quantity::names(&study.model);
-    names.iter().filter_map(|name| Quantity::named(name, &study.model)).collect()
+/// Values of quantities at a point with its profile; NaN where they are not defined.
+fn values_on(point: &Point, quantities: &[Quantity], model: &Model) -> Vec<f64> {
+    quantities.iter().map(|quantity| quantity.on(point, model).unwrap_or(f64::NAN)).collect()
 }
 
 fn stamp(folder: &Path) -> Stamp {

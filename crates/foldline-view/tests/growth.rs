@@ -4,7 +4,7 @@ use crate::common::{PATIENCE, Served, run_in, study};
 use foldline::contract::{Event, Observer};
 use foldline::diagram::{Branch, Diagram, Ending};
 use foldline_store::run_file::{Part, Recorder, is_written, load_part};
-use foldline_view::html;
+use foldline_view::{Shown, html};
 use std::time::Instant;
 
 /// Header and columns of a frame of points.
@@ -114,7 +114,7 @@ fn a_page_in_one_file_has_everything_and_asks_for_nothing() {
     let folder = tempfile::tempdir().expect("a folder can be made");
     let path = folder.path().join("</script>");
     let diagram = run_in(&path);
-    let (page, amount) = html(&path).expect("the run can be read");
+    let (page, amount) = html(&path, &Shown::default()).expect("the run can be read");
     assert_eq!(amount.points, diagram.branches[0].points.len());
     assert_eq!(amount.solutions, diagram.branches[0].points.len() + diagram.branches[0].special.len());
     assert!(!page.contains("src=") && !page.contains("app.css") && !page.contains("@import"));

@@ -4,6 +4,7 @@
 mod common;
 mod contrast;
 mod growth;
+mod harmonics;
 mod orders;
 mod security;
 

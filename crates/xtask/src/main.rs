@@ -24,7 +24,7 @@ const USAGE: &str = "cargo xtask TASK
   check       the same without the tests and the dependencies
   words       spelling, links, phrasing and the invariants of ARCHITECTURE.md; with --all phrases in files that are not revised yet too
   address     replaces the address of the repository everywhere: cargo xtask address https://HOST/PATH
-  page        the page of `foldline view` in Chromium; where Node.js or Chromium is missing that is said
+  page        the page of `foldline view` in Chromium; where Node.js or Chromium is missing that is said; --write: its pictures in the book
   python      the wheel of the Python package, its formatter, type checker and tests in an environment under target; where there is no
               Python that is said
   deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
@@ -50,6 +50,7 @@ fn main() -> ExitCode {
         "check" => check(),
         "words" => words(std::env::args().nth(2).as_deref() == Some("--all")),
         "address" => release::move_to(&std::env::args().nth(2).unwrap_or_default()),
+        "page" if std::env::args().nth(2).as_deref() == Some("--write") => page::write(),
         "page" => page::test(),
         "python" => python::test(),
         "deny" => deny(),

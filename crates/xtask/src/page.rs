@@ -1,4 +1,4 @@
-//! `cargo xtask page`: tests the page of `foldline view` in a browser.
+//! `cargo xtask page`: tests the page of `foldline view` in a browser; with `--write`, its pictures in the book are made.
 
 use crate::{cargo, root, run};
 use std::path::{Path, PathBuf};
@@ -12,13 +12,27 @@ const NODE: u32 = 20;
 
 /// Builds the program and tests its page.
 pub fn test() -> bool {
-    cargo(&["build", "--quiet", "--package", "foldline-cli"]) && test_built()
+    built() && test_built()
+}
+
+/// Builds the program and writes the pictures of its page in the book.
+pub fn write() -> bool {
+    built() && node_runs(&["pictures.mjs"])
+}
+
+fn built() -> bool {
+    cargo(&["build", "--quiet", "--package", "foldline-cli"])
 }
 
 /// Tests the page of the program that the build of the tests has left. Its tests run under `target/page`, where their
 /// only dependency is installed. Without Node.js, npm, a browser or a package registry, a message says that the page was
 /// not tested.
 pub fn test_built() -> bool {
+    node_runs(&["--test", "--test-concurrency=1", "--test-reporter=dot"])
+}
+
+/// Calls Node.js with these arguments.
+fn node_runs(arguments: &[&str]) -> bool {
     let Some(browser) = browser() else {
         eprintln!("the page NOT tested: there is no Chromium; CHROMIUM=PATH names one");
         return true;
@@ -41,7 +55,7 @@ pub fn test_built() -> bool {
     }
     let program = root().join("target/debug").join(format!("foldline{}", std::env::consts::EXE_SUFFIX));
     let mut node = Command::new("node");
-    node.current_dir(&folder).args(["--test", "--test-concurrency=1", "--test-reporter=dot"]);
+    node.current_dir(&folder).args(arguments);
     node.env("FOLDLINE", program).env("ROOT", root()).env("BROWSER", browser);
     run(&mut node)
 }

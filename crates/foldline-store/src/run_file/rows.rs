@@ -76,15 +76,15 @@ pub(super) fn values_of(point: &Point, extra: &[f64], named: usize) -> Vec<Value
         Value::Integer(i64::from(forcing_periods)),
         if gain.is_empty() { Value::Null } else { Value::Blob(gain) },
         Value::Blob(parameters),
-        Value::Blob(profile),
-        mesh,
-        Value::Blob(tangent),
         Value::Blob(spectrum),
         Value::Blob(ranges),
         Value::Blob(averages),
         Value::Blob(scalars),
         Value::Integer(checksums[0]),
         Value::Integer(checksums[1]),
+        Value::Blob(profile),
+        mesh,
+        Value::Blob(tangent),
     ]);
     values
 }

@@ -61,7 +61,8 @@ const OTHERS: [&str; 11] = [
     "rowid",
 ];
 
-/// Columns of a point in both tables of points, with their types: first the readable ones, then the exact bytes.
+/// Columns of a point in both tables of points, with their types: first the readable ones, then the exact bytes. Those
+/// of profiles, which fill several pages of the file, are last: SQLite reads all pages before a column to get at it.
 const POINT_COLUMNS: [(&str, &str); 26] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
@@ -80,16 +81,19 @@ const POINT_COLUMNS: [(&str, &str); 26] = [
     ("forcing_periods", "INTEGER NOT NULL DEFAULT 0"),
     ("gain_bytes", "BLOB"),
     ("parameter_bytes", "BLOB NOT NULL"),
-    ("solution_bytes", "BLOB NOT NULL"),
-    ("mesh_bytes", "BLOB"),
-    ("tangent_bytes", "BLOB NOT NULL"),
     ("spectrum_bytes", "BLOB NOT NULL"),
     ("range_bytes", "BLOB NOT NULL"),
     ("average_bytes", "BLOB"),
     ("scalar_bytes", "BLOB NOT NULL"),
     ("numbers_checksum", "INTEGER"),
     ("solution_checksum", "INTEGER"),
+    ("solution_bytes", "BLOB NOT NULL"),
+    ("mesh_bytes", "BLOB"),
+    ("tangent_bytes", "BLOB NOT NULL"),
 ];
+
+/// Index of the table of points that holds the quantities of diagrams. SQLite reads them from it, without the rows.
+const INDEX: &str = "points_in_diagrams";
 
 /// Returns the statements that create all tables.
 pub(super) fn create(columns: &Columns) -> String {
@@ -114,6 +118,12 @@ pub(super) fn create(columns: &Columns) -> String {
              {of_points}, PRIMARY KEY (branch, kind, position, key));
          CREATE TABLE notes (branch TEXT NOT NULL, note TEXT NOT NULL, UNIQUE (branch, note));"
     )
+}
+
+/// Returns the statement that creates the index of the quantities of diagrams unless it exists.
+pub(super) fn index(columns: &Columns) -> String {
+    let shown: String = columns.names().map(|name| format!("{}, ", quoted(name))).collect();
+    format!("CREATE INDEX IF NOT EXISTS {INDEX} ON points (branch, position, unstable, period, {shown} average_bytes);")
 }
 
 /// Returns the statements that upgrade a file from `version` to the next one.

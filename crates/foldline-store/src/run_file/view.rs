@@ -55,7 +55,8 @@ impl Reading {
     }
 
     /// Passes position, number of unstable eigenvalues or multipliers, and the values of `quantities` at each point of
-    /// a branch with a position in `reach`, in increasing order. Values that do not exist are NaN.
+    /// a branch with a position in `reach`, in increasing order. Values that do not exist are NaN. SQLite reads them from
+    /// the index of diagrams, which is a hundredth of the file; files of earlier versions have none.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -100,6 +101,48 @@ impl Reading {
                 *value = found.unwrap_or(f64::NAN);
             }
             take(row.get(0).map_err(failed)?, row.get(1).map_err(failed)?, &values);
+        }
+        Ok(())
+    }
+
+    /// Passes each complete point of a branch with a position in `reach`, in increasing order.
+    ///
+    /// # Errors
+    /// If the file cannot be read or a point is damaged.
+    pub fn each_point_in(
+        &self,
+        branch: i64,
+        reach: [i64; 2],
+        mut take: impl FnMut(&Point),
+    ) -> Result<(), RunFileError> {
+        let failed = |error| RunFileError::from_sqlite(&self.path, error);
+        let sql = "SELECT * FROM points WHERE branch = ?1 AND position BETWEEN ?2 AND ?3 ORDER BY position";
+        let mut statement = self.connection.prepare_cached(sql).map_err(failed)?;
+        let mut rows = statement.query(params![branch, reach[0], reach[1]]).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            let (point, _) = point_in(row).map_err(|what| RunFileError::Damaged(self.path.clone(), what))?;
+            take(&point);
+        }
+        Ok(())
+    }
+
+    /// Passes each complete special point of a branch with its index, in the order in which branches list them.
+    ///
+    /// # Errors
+    /// If the file cannot be read or a point is damaged.
+    pub fn each_special_point(
+        &self,
+        branch: i64,
+        mut take: impl FnMut(usize, &SpecialPoint),
+    ) -> Result<(), RunFileError> {
+        let failed = |error| RunFileError::from_sqlite(&self.path, error);
+        let sql = format!("SELECT * FROM special_points WHERE branch = ?1 ORDER BY {}", special_order());
+        let mut statement = self.connection.prepare_cached(&sql).map_err(failed)?;
+        let mut rows = statement.query([branch]).map_err(failed)?;
+        let mut index = 0;
+        while let Some(row) = rows.next().map_err(failed)? {
+            take(index, &special_in(row).map_err(|what| RunFileError::Damaged(self.path.clone(), what))?);
+            index += 1;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@ use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::revised::{lengthen, scales, text};
 use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
-use super::schema::{Columns, create, insertion, upgrade};
+use super::schema::{Columns, create, index, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
 use crate::study_file::{Store, Study};
 use foldline::contract::{Event, Observer, Verdict};
@@ -248,6 +248,7 @@ impl Recorder {
             rows.collect::<Result<HashMap<String, i64>, _>>().map_err(failed)?
         };
         let columns = Columns::new(&study.model);
+        connection.execute_batch(&index(&columns)).map_err(failed)?;
         responses::create(&connection, &study.model).map_err(failed)?;
         super::designs::create(&connection).map_err(failed)?;
         connection.execute_batch(SHORTFALLS).map_err(failed)?;

@@ -25,8 +25,12 @@ pub fn study() -> Study {
 
 /// Computes a small run and returns it as it is stored: with all points, of which only some stay in memory.
 pub fn run_in(folder: &Path) -> Diagram {
-    let study = study();
-    let recorder = Recorder::create(folder, &study).expect("the folder is new");
+    run_of(folder, &study())
+}
+
+/// Computes the run of a study.
+pub fn run_of(folder: &Path, study: &Study) -> Diagram {
+    let recorder = Recorder::create(folder, study).expect("the folder is new");
     let system = explore::System::of_plan(&study.model, &study.plan);
     explore::run(&system, &study.plan, 1, Diagram::default(), &recorder);
     recorder.complete().expect("the run can be written");

@@ -29,9 +29,9 @@ export function table(run, what = "--special") {
   return JSON.parse(execFileSync(FOLDLINE, ["table", run, what, "--format", "json"], { encoding: "utf8", maxBuffer: 1 << 28 }));
 }
 
-/** Starts `foldline view`; resolves when it has printed its address. */
+/** Starts `foldline view`, of nothing if `what` is null; resolves when it has printed its address. */
 export function view(what, ...options) {
-  const child = spawn(FOLDLINE, ["view", what, "--no-browser", ...options], { stdio: ["ignore", "pipe", "ignore"] });
+  const child = spawn(FOLDLINE, ["view", ...(what === null ? [] : [what]), "--no-browser", ...options], { stdio: ["ignore", "pipe", "ignore"] });
   const ended = new Promise((done) => child.on("exit", (code, signal) => done(code ?? signal)));
   const address = new Promise((done, fail) => {
     let text = "";

@@ -2,17 +2,17 @@
 
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { readFileSync, rmSync } from "node:fs";
+import { readFileSync, rmSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { appears, browse, drawn, finishedRun, folder, FOLDLINE, PATIENCE, STUDY, table, view } from "./common.mjs";
+import { appears, browse, drawn, finishedRun, folder, FOLDLINE, PATIENCE, ROOT, STUDY, table, view } from "./common.mjs";
 
 after(() => rmSync(folder, { recursive: true, force: true }));
 
-/** A page with the finished run. */
-async function finishedPage(context, options) {
-  const viewer = view(finishedRun());
+/** A page with a finished run. */
+async function finishedPage(context, options, run = finishedRun()) {
+  const viewer = view(run);
   const browser = await browse(options);
   context.after(async () => {
     await browser.browser.close();
@@ -153,6 +153,81 @@ test("a view is kept in the address", limit, async (t) => {
   await page.reload();
   await drawn(page);
   assert.equal(await page.evaluate(() => window.foldline.app.run.about.quantities[window.foldline.app.diagram.qy].name), "u_max");
+});
+
+test("harmonics are axes, with the values of foldline table, and are saved with the page", limit, async (t) => {
+  const study = join(folder, "recorded.toml");
+  const text = readFileSync(STUDY, "utf8").replace(/^model = "\.\.\/\.\.\/(.*)"$/m, (_, path) => `model = ${JSON.stringify(join(ROOT, path))}\nrecord = ["r_h1_dB"]`);
+  writeFileSync(study, text);
+  const run = join(folder, "recorded");
+  execFileSync(FOLDLINE, ["run", study, "--out", run, "-q"], { stdio: "ignore" });
+  const { page, context, errors } = await finishedPage(t, {}, run);
+  await page.selectOption('[aria-label="y axis"]', { label: "r_h1_dB [dB]" });
+  await page.waitForFunction(() => location.hash.includes("y=r_h1_dB"));
+  const rows = table(run, "--points").filter((row) => row.branch === "SL");
+  const drawn_values = (own) => own.evaluate(() => {
+    const { app } = window.foldline;
+    const branch = app.run.listed().find((one) => one.about.name === "SL");
+    const of = (special) => branch.places().filter((place) => (place.special >= 0) === special).map((place) => branch.value(place, app.diagram.qy));
+    return [of(false), of(true)];
+  });
+  const [points, special] = await drawn_values(page);
+  // The equilibria of S have an amplitude of zero, which has no level: the others are drawn all the same.
+  const view = await page.evaluate(() => window.foldline.app.diagram.chart.view());
+  assert.ok(points.every((value) => value > view[2] && value < view[3]), `${view}`);
+  assert.deepEqual(points, rows.map((row) => row.r_h1_dB));
+  const found = table(run).filter((row) => row.branch === "SL");
+  assert.deepEqual([...special].sort(), found.map((row) => row.r_h1_dB).sort());
+  assert.ok(special.length > 2 && special.every(Number.isFinite));
+  const [file] = await Promise.all([page.waitForEvent("download"), page.click('#saving button:has-text("HTML")')]);
+  const saved = join(folder, "harmonics.html");
+  await file.saveAs(saved);
+  const copy = await (await context.browser().newContext({ offline: true })).newPage();
+  await copy.goto(pathToFileURL(saved).href);
+  await drawn(copy);
+  assert.deepEqual(await drawn_values(copy), [points, special]);
+  assert.deepEqual(errors, []);
+});
+
+test("the line of a phase is interrupted where it passes 180 degrees", limit, async (t) => {
+  const model = '[parameters]\nOmega = 0.8\n[forcing]\nfrequency = "Omega"\n[states.x]\nequation = "v"\nrange = [-2, 2]\n[states.v]\nequation = "-x - 0.1*v + 0.1*cos(Omega*t)"\nrange = [-2, 2]\n[outputs]\nback = "-v"\n';
+  const text = 'model = "phase-model.toml"\n[[seed]]\nname = "start"\nattractor = "cycle"\n[[branch]]\nname = "main"\nfrom = "start"\nfree = "Omega"\nrange = [0.5, 2]\n';
+  writeFileSync(join(folder, "phase-model.toml"), model);
+  writeFileSync(join(folder, "phase.toml"), text);
+  const run = join(folder, "phase");
+  execFileSync(FOLDLINE, ["run", join(folder, "phase.toml"), "--out", run, "-q"], { stdio: "ignore" });
+  const { page } = await finishedPage(t, {}, run);
+  await page.selectOption('[aria-label="y axis"]', { label: "back_h1_phase [deg]" });
+  await page.waitForFunction(() => location.hash.includes("y=back_h1_phase"));
+  const { values, svg, height } = await page.evaluate(() => {
+    const { app, svg: picture } = window.foldline;
+    const branch = app.run.listed()[0];
+    const { top, bottom } = app.diagram.chart.box;
+    return { values: branch.places().map((place) => branch.value(place, app.diagram.qy)), svg: picture(), height: bottom - top };
+  });
+  // x lags by 0 to 180 degrees, so -v does by 90 to 270.
+  assert.ok(Math.max(...values) > 150 && Math.min(...values) < -150);
+  const lines = [...svg.matchAll(/<path d="(M[^"]*)" fill="none" stroke="[^"]*" stroke-width="2"/g)].map((own) => own[1].split(/[ML]/).slice(1).map((pair) => Number(pair.split(" ")[1])));
+  assert.ok(lines.length >= 2);
+  for (const ys of lines) for (let k = 1; k < ys.length; k += 1) assert.ok(Math.abs(ys[k] - ys[k - 1]) < height / 2);
+});
+
+test("a quantity that is in no list is shown by its name, and a wrong name says why", limit, async (t) => {
+  const { page } = await finishedPage(t);
+  await page.selectOption('[aria-label="y axis"]', { label: "by name …" });
+  await page.fill("#quantity-name", "u_h0");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => document.querySelector("#quantity [role=alert]").textContent.startsWith("there is no quantity u_h0"));
+  await page.fill("#quantity-name", "whirl_h-1/whirl_h1_dB");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => location.hash.includes("y=whirl_h-1%2Fwhirl_h1_dB"));
+  await page.reload();
+  await drawn(page);
+  assert.equal(await page.evaluate(() => window.foldline.app.run.about.quantities[window.foldline.app.diagram.qy].name), "whirl_h-1/whirl_h1_dB");
+  // Leaving without a name leaves the axis as it was.
+  await page.selectOption('[aria-label="y axis"]', { label: "by name …" });
+  await page.click('#quantity button:text-is("Cancel")');
+  await page.waitForFunction(() => document.querySelector('[aria-label="y axis"]').selectedOptions[0].textContent.includes("whirl_h-1/whirl_h1_dB"));
 });
 
 test("curves in two parameters have axes of their own", limit, async (t) => {
