@@ -710,6 +710,7 @@ impl Growth<'_> {
         let beyond: RefCell<Option<beside_impacts::Beyond>> = RefCell::new(None);
         // Parameters of the last impact grazing, and the number of unstable multipliers beyond it.
         let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
+        let doubled = is_doubled(branch);
         let trespassed: RefCell<Option<String>> = RefCell::new(None);
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
@@ -791,7 +792,11 @@ impl Growth<'_> {
                     ending = Ending::GivenUp(why);
                     break;
                 }
-                let Some((problem, station)) = beyond.take() else { break };
+                // A doubled cycle may go over into one of half the period, which lies on another branch.
+                let halved = |(_, next): &beside_impacts::Beyond| {
+                    doubled && collapse::repeats(&next.point, 100.0 * self.settings.tolerance)
+                };
+                let Some((problem, station)) = beyond.take().filter(|next| !halved(next)) else { break };
                 (other, next) = (Some(problem), Some(station));
             }
             let holds = walk.holds && other.is_none();
@@ -1208,6 +1213,7 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
     }
     if branch.family == Family::Cycle {
         all.push(Box::new(collapse::Halves {
+            field: system.field,
             scales: &system.scales,
             born: is_doubled(branch) || lasts_even_periods(branch),
         }));

@@ -7,6 +7,7 @@
 use super::hopf;
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution, Symmetry};
+use crate::problem::impact::stored::impacts;
 use crate::problem::mesh;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
@@ -45,6 +46,8 @@ impl Shrinks<'_> {
 
 /// Difference between the halves of a cycle: vanishes where it becomes a cycle of half the period.
 pub struct Halves<'a> {
+    /// Vector field.
+    pub field: &'a dyn VectorField,
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
     /// True if the branch is known to have begun at a period doubling. On other branches, halves that differ much are
@@ -58,6 +61,10 @@ pub const NEARLY: f64 = 0.3;
 impl Halves<'_> {
     fn comparable(&self, at: &Point) -> bool {
         let Solution::Cycle(cycle) = &at.solution else { return false };
+        // Halves with different numbers of events become equal only where an event loses its speed, which ends the branch.
+        if !impacts(self.field, &at.parameters, cycle).len().is_multiple_of(2) {
+            return false;
+        }
         if self.born {
             return true;
         }
@@ -75,6 +82,15 @@ impl Halves<'_> {
                 pairs.all(|((x, y), [low, high])| (x - y).abs() <= NEARLY * (high - low))
             })
     }
+}
+
+/// True if a cycle is one of half its period, traversed twice, within a share of its extent.
+pub fn repeats(at: &Point, within: f64) -> bool {
+    let Solution::Cycle(cycle) = &at.solution else { return false };
+    let (x, n) = (cycle.level(SAMPLES), cycle.dim());
+    let (one, other) = x.split_at(SAMPLES / 2 * n);
+    let ranges = at.ranges.iter().take(n).cycle();
+    one.iter().zip(other).zip(ranges).all(|((a, b), [low, high])| (a - b).abs() <= within * (high - low))
 }
 
 impl Monitor for Shrinks<'_> {
