@@ -228,11 +228,6 @@ pub trait VectorField: Send + Sync {
     /// parameters that occur in the conditions only.
     fn refer(&self, _ends: [&[f64]; 2], _parameters: &mut [f64]) {}
 
-    /// Conditions that determine no more than the place of the solution in time, and change with [`VectorField::refer`].
-    fn timings(&self) -> Vec<usize> {
-        Vec::new()
-    }
-
     /// Estimates `[b]` of the terms that the conditions at the ends neglect; empty if they are exact.
     fn remainders(&self, _ends: [&[f64]; 2], _parameters: &[f64]) -> Vec<f64> {
         Vec::new()
@@ -423,9 +418,6 @@ pub trait ZeroProblem {
     /// Distance of a point from one with singular F_x, measured by its spectrum. It is small where another branch may
     /// be close.
     fn margin(&self, at: &Point) -> f64;
-
-    /// Removes from a residual what only shifts the solution in time, because its conditions refer to another solution.
-    fn overlook_shift(&self, _r: &mut [f64]) {}
 
     /// Relative residual of the original equations at `u`, which solves an unfolded system; 0 if no unfolding terms are
     /// present.

@@ -137,7 +137,6 @@ impl Follow<'_> {
             return Err(Failure::NotFinite);
         }
         r[u.len() - 1] = 0.0;
-        self.problem.overlook_shift(&mut r);
         self.problem.solve(&r, &mut du);
         let miss = self.problem.dot(&du, &du).sqrt() / length.abs();
         let crowded = self.problem.margin(&left.point).min(self.problem.margin(&right.point)) < CROWDED;

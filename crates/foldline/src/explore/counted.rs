@@ -141,10 +141,6 @@ impl VectorField for Counted<'_> {
         self.field.refer(ends, parameters);
     }
 
-    fn timings(&self) -> Vec<usize> {
-        self.field.timings()
-    }
-
     fn remainders(&self, ends: [&[f64]; 2], parameters: &[f64]) -> Vec<f64> {
         self.field.remainders(ends, parameters)
     }

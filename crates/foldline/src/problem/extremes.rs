@@ -1,7 +1,7 @@
 //! Smallest and largest values of states and outputs.
 //!
 //! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a
-//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one. At the ends of an
+//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one, and all of them where the state jumps. At the ends of an
 //! interval that is not periodic, the polynomials are continued a little, and only places inside count.
 
 use super::gauss::Scheme;
@@ -9,7 +9,7 @@ use crate::contract::{Batch, Parameters, VectorField};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::panel;
 
-/// Number of peaks of one channel that are refined.
+/// Number of peaks of one channel that are refined, unless the state jumps.
 const PEAKS: usize = 3;
 /// Distance between a peak and its neighbours, in samples, at which refinement stops.
 const CLOSE: f64 = 0.005;
@@ -46,8 +46,10 @@ pub fn of_profile(
     // For every channel and sign, the largest value times the sign, and the best few peaks.
     let mut best = Vec::with_capacity(2 * channels);
     let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
+    // Parabolas across a jump of the state rise far above the samples.
+    let kept = if field.event_count() > 0 { usize::MAX } else { PEAKS };
     for line in values.chunks_exact(lanes) {
-        for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line, open)) {
+        for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line, open, kept)) {
             peaks.extend(places.iter().map(|&place| Peak {
                 of: best.len(),
                 sign,
@@ -229,7 +231,7 @@ impl Orbit<'_> {
 }
 
 /// Largest value of sign · line for both signs, -1 first, and the samples of its best few peaks, best first.
-fn outermost(line: &[f64], open: bool) -> [(f64, Vec<usize>); 2] {
+fn outermost(line: &[f64], open: bool, kept: usize) -> [(f64, Vec<usize>); 2] {
     let lanes = line.len();
     let mut found = [Summit::default(), Summit::default()];
     let mut look = |l: usize| {
@@ -241,8 +243,8 @@ fn outermost(line: &[f64], open: bool) -> [(f64, Vec<usize>); 2] {
             return;
         }
         let [low, high] = &mut found;
-        low.look(l, triple.map(|v| -v));
-        high.look(l, triple);
+        low.look(l, triple.map(|v| -v), kept);
+        high.look(l, triple, kept);
     };
     // If the line is monotonic over a block and one sample on either side, no sample in it is a peak.
     const BLOCK: usize = Eight::COUNT;
@@ -282,9 +284,9 @@ impl Default for Summit {
 }
 
 impl Summit {
-    /// Considers sample l, given with its neighbours.
+    /// Considers sample l, given with its neighbours, as one of the best `kept` peaks.
     #[inline(always)]
-    fn look(&mut self, l: usize, [before, here, after]: [f64; 3]) {
+    fn look(&mut self, l: usize, [before, here, after]: [f64; 3], kept: usize) {
         if here > self.top {
             self.top = here;
         }
@@ -293,7 +295,7 @@ impl Summit {
             let rise = if bend > 0.0 { (after - before) * (after - before) / (8.0 * bend) } else { 0.0 };
             let at = self.peaks.partition_point(|peak| peak.0.total_cmp(&(here + rise)).is_ge());
             self.peaks.insert(at, (here + rise, l));
-            self.peaks.truncate(PEAKS);
+            self.peaks.truncate(kept);
         }
     }
 }

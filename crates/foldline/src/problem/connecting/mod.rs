@@ -787,12 +787,6 @@ impl VectorField for ConnectingField<'_> {
         }
     }
 
-    fn timings(&self) -> Vec<usize> {
-        let [first, second] = self.row_ranges().map(|rows| rows.len() / self.dim());
-        let first = self.places * self.dim() + first;
-        vec![first, first + 1 + second]
-    }
-
     fn remainders(&self, ends: [&[f64]; 2], parameters: &[f64]) -> Vec<f64> {
         let (n, ranges) = (self.dim(), self.row_ranges());
         let mut all = vec![0.0; self.places * n];

@@ -733,13 +733,6 @@ impl ZeroProblem for CycleProblem<'_> {
         u
     }
 
-    fn overlook_shift(&self, r: &mut [f64]) {
-        if self.is_open() {
-            let places: Vec<usize> = self.places_of_conditions().collect();
-            self.setting.field.timings().iter().for_each(|condition| r[places[*condition]] = 0.0);
-        }
-    }
-
     fn shift(&self, u: &[f64], change: &[f64]) -> Option<Shift> {
         self.split(u, change)
     }
