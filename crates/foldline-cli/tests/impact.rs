@@ -293,3 +293,109 @@ fn torus_points_of_cycles_with_impacts() {
         assert!((e - (-0.05 * std::f64::consts::PI / w).exp()).abs() < 1e-8, "{w} {e}");
     }
 }
+
+/// x'' = A cos(ω t) + F0 - c x' - k x with a rigid wall at x = d.
+fn walled([k, c, e, f0, a, d]: [f64; 6], start: f64) -> String {
+    format!(
+        "name = \"wall\"\nunits = \"labels\"\n[parameters]\nw = {start}\nk = {k}\nc = {c}\ne = {e}\nF0 = {f0}\nA = {a}\nd = {d}\n\
+         [forcing]\nfrequency = \"w\"\n[states.\"x''\"]\nequation = \"A*cos(w*t) + F0 - c*x' - k*x\"\nrange = [-2, {d}]\n\
+         velocity = {{ range = [-2, 2] }}\n[contact.wall]\nat = \"x\"\nclearance = \"d\"\nrestitution = \"e\"\n"
+    )
+}
+
+/// The motion without impacts touches the wall where F0/k + A/|k - ω² + i c ω| = d. Newton's method leads to its orbits beyond the
+/// touch as well, which cross the surface of the wall.
+#[test]
+fn grazings_of_motions_without_impacts_lie_where_the_closed_form_says() {
+    for (model, grazes, tolerance) in [
+        ([0.325, 0.0222, 0.368, 0.245, 0.699, 1.736], 1.018_008_945_596_513_8, 1e-8),
+        ([1.144, 0.0223, 0.443, 0.186, 1.548, 1.291], 1.585_995_795_075_96, 1e-8),
+        ([1.144, 0.0223, 0.443, 0.186, 1.548, 1.291], 1.585_995_795_075_96, 1e-5),
+    ] {
+        let [k, c, _, f0, a, d] = model;
+        let amplitude = |w: f64| f0 / k + a / (k - w * w).hypot(c * w);
+        assert!((amplitude(grazes) - d).abs() < 1e-12, "{}", amplitude(grazes) - d);
+        let start = 2.5 * grazes;
+        let study = format!(
+            "tolerance = {tolerance}\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 8\n\
+             [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [{}, {start}]\nmax-points = 200\n",
+            0.9 * grazes
+        );
+        let diagram = run(&walled(model, start), &study);
+        let own = diagram.branch("b").unwrap();
+        let found = own.special.iter().find(|s| s.kind == Kind::ImpactGrazing).unwrap();
+        let off = (found.point.parameters[0] - grazes).abs();
+        assert!(off <= found.error * own.size(grazes) && found.error < 10.0 * tolerance, "{off} {}", found.error);
+        assert!(found.remark.ends_with("1 → 0"), "{}", found.remark);
+    }
+}
+
+/// Impacts accumulate near ω = 0.793: at every further one the branch goes on, none of its points passes the wall at 0.622, and where
+/// chatter is near it ends with that word.
+#[test]
+fn accumulating_impacts_end_a_branch_in_words() {
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 16\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.4, 4]\n";
+    let diagram = run(&walled([1.0, 0.3639, 0.324, 0.091, 1.739, 0.622], 2.25), study);
+    let own = diagram.branch("b").unwrap();
+    assert!(own.points.iter().all(|point| point.ranges[0][1] < 0.622 + 1e-6));
+    let least = own.points.iter().map(|point| point.parameters[0]).fold(f64::INFINITY, f64::min);
+    assert!((least - 0.793).abs() < 1e-3, "{least}");
+    let ended = own.ends.iter().flatten().filter(|end| !end.complete()).map(Ending::to_string).collect::<Vec<String>>();
+    assert!(matches!(&ended[..], [one] if one.contains("chatter")), "{ended:?}");
+}
+
+/// A doubled cycle with one impact in two periods of the force passes the grazing of the motion without impacts, traversed twice, and
+/// comes back with the impact in the other period. (A comparison of its halves led from there to the period doubling at once.)
+#[test]
+fn a_doubled_cycle_does_not_leap_from_a_grazing_to_its_start() {
+    let model = "name = \"wall\"\nunits = \"labels\"\n[parameters]\nk = 3820\nc = 22.32\nF0 = -89.5\nA = 120.3\nw = 46.4\nd = 0.00295\n\
+                 e = 0.784\n[forcing]\nfrequency = \"w\"\n[states]\nx = { equation = \"v\", range = [-0.02, 0.0029205] }\n\
+                 v = { equation = \"A*cos(w*t) + F0 - c*v - k*x\", range = [-2, 2] }\n\
+                 [events.a]\nwhen = \"x - d\"\nset = { v = \"-e*v\" }\nallowed = \"x <= d\"\n";
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 32\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [24.7, 154.5]\nswitch = { period-doubling = 1 }\n";
+    let diagram = run(model, study);
+    let doubled = diagram.branches.iter().filter(|own| own.name.contains("period-doubling"));
+    let mut count = 0;
+    for own in doubled {
+        for pair in own.points.windows(2) {
+            let [a, b] = [&pair[0], &pair[1]].map(|point| point.ranges[1][1]);
+            assert!((a - b).abs() < 0.03, "{}: {a} then {b}", own.name);
+            count += 1;
+        }
+    }
+    assert!(count > 5, "{count}");
+}
+
+/// Twelve jumps of v in two periods, and its largest value on a smooth piece: no node of the profile lies above it.
+#[test]
+fn the_largest_value_between_jumps_is_found() {
+    let model = "name = \"walls\"\nunits = \"labels\"\n[parameters]\nk = 1e-8\nc = 1.9e-5\nF0 = -8.36e-13\nA = 1.611e-12\nom = 0.0001477\n\
+                 d = 0.0001009\ne = 0.919\n[forcing]\nfrequency = \"om\"\n[states]\nx = { equation = \"v\", range = [-9.08e-5, 9.08e-5] }\n\
+                 v = { equation = \"A*cos(om*t) + F0 - c*v - k*x\", range = [-2e-8, 2e-8] }\n\
+                 [events.a]\nwhen = \"x - d\"\nset = { v = \"-e*v\" }\nallowed = \"x <= d\"\n\
+                 [events.b]\nwhen = \"-x - d\"\nset = { v = \"-e*v\" }\nallowed = \"x >= -d\"\n";
+    let study = "tolerance = 1e-5\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 32\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+                 free = \"om\"\nrange = [4e-5, 2.5e-4]\nswitch = { period-doubling = 1, branch-point = 1 }\n";
+    let diagram = run(model, study);
+    let doubled = diagram.branch("b/period-doubling-1").unwrap();
+    assert!(doubled.points.len() > 5);
+    for point in &doubled.points {
+        let Solution::Cycle(cycle) = &point.solution else { panic!() };
+        let stored = cycle.profile.chunks_exact(2).map(|x| x[1]).fold(0.0, f64::max);
+        assert!(point.ranges[1][1] >= stored, "{} {stored}", point.ranges[1][1]);
+    }
+}
+
+/// Cycles with different numbers of impacts are compared at branch points. Once this ended in a panic.
+#[test]
+fn branches_with_different_numbers_of_impacts_are_told_apart() {
+    let model = "name = \"walls\"\nunits = \"labels\"\n[parameters]\nk = 64.1\nc = 0.588\nA = 227.3\nom = 15.46\nd = 0.969\ne = 0.558\n\
+                 [forcing]\nfrequency = \"om\"\n[states.\"x''\"]\nequation = \"A*cos(om*t) - c*x' - k*x\"\nrange = [-0.8721, 0.8721]\n\
+                 velocity = { range = [-20, 20] }\n[contact.w]\nat = \"x\"\nclearance = \"d\"\nrestitution = \"e\"\nside = \"both\"\n";
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 32\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+                 free = \"om\"\nrange = [2.002, 20.02]\nswitch = { period-doubling = 1, branch-point = 1 }\n";
+    let own = run(model, study);
+    assert!(own.branch("b/branch-point-1").is_some_and(|own| own.points.len() > 10));
+}
