@@ -148,6 +148,31 @@ fn an_unknown_is_determined_by_a_further_condition() {
     }
 }
 
+/// The same where the deflection has a given height: 14.80440660 and 29.60881320.
+#[test]
+fn a_beam_between_fixed_supports_carries_the_load_of_its_height() {
+    let more = "switch = { branch-point = 1 }\nmark = { w_max = [1, 2] }\nstop = { w_max = 2.2 }";
+    let (_, diagram) = of("buckled-beam", &seeded("state = \"zero\"", "p", "[5, 35]", more));
+    let marks = of_kind(diagram.branch("b/branch-point-1").unwrap(), Kind::Mark);
+    // The last one is the stop.
+    assert_eq!(marks.len(), 3);
+    for (mark, known) in marks.iter().zip([14.804_406_60, 29.608_813_20]) {
+        near(mark.point.parameters[0], known, 1e-8);
+    }
+}
+
+/// The second point of a curve must not depend on the step that led to it: beside the fold steps once shrank to 10⁻⁶.
+#[test]
+fn steps_past_a_fold_are_as_long_as_elsewhere() {
+    let model = include_str!("../../../models/bratu.toml");
+    let study = seeded("state = \"zero\"", "p", "[0, 4]", "stop = { u_max = 8 }");
+    let (_, diagram) = given(model, &study);
+    let own = diagram.branch("b").unwrap();
+    let values: Vec<f64> = own.points.iter().map(|point| point.parameters[0]).collect();
+    let short = values.windows(2).skip(8).filter(|pair| (pair[1] - pair[0]).abs() < 1e-4).count();
+    assert!(short <= 1, "{values:?}");
+}
+
 /// u = x⁴ + c x on [0, L], u(L) = 1, from a first profile in terms of the independent variable.
 #[test]
 fn length_and_independent_variable_enter_the_equations() {

@@ -451,3 +451,23 @@ fn an_interrupted_branch_with_held_quantities_is_resumed() {
         assert!((a.parameters[1] - b.parameters[1]).abs() < 1e-7);
     }
 }
+
+/// Swings of a pendulum of given period T = 4 K(sin²(a/2)): the closed form.
+#[test]
+fn a_pendulum_of_given_period() {
+    let model =
+        "name = \"pendulum\"\n[parameters]\ng = 1\nzeta = 0\n[states]\nth = \"v\"\nv = \"-2*zeta*v - g*sin(th)\"\n";
+    let study = "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nstate = { th = 0, v = 0 }\n\
+        [[branch]]\nname = \"rest\"\nfrom = \"s\"\nfree = \"zeta\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\nstop = { th_max = 1.2 }\n\
+        [[branch]]\nname = \"swings\"\nfrom = \"rest/hopf-1\"\nfree = \"zeta\"\nrange = [-1, 1]\nmark = { period = [7, 8, 10] }\n\
+        stop = { th_max = 2.6 }\n";
+    let (model, diagram) = run(model, study);
+    let own = branch(&diagram, "swings");
+    let marks: Vec<f64> =
+        own.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| value(&model, &s.point, "th_max")).collect();
+    // The last one is the stop.
+    assert_eq!(marks.len(), 4, "{marks:?} {:?}", own.ends);
+    for (found, known) in marks.iter().zip([1.284_567_283_964, 1.862_633_747_236, 2.439_906_971_216]) {
+        assert!((found / known - 1.0).abs() < 1e-8, "{found} {known}");
+    }
+}
