@@ -193,7 +193,7 @@ pub struct Run {
     #[arg(value_name = "STUDY.toml")]
     pub study: PathBuf,
     /// Folder for the run [default: runs/NAME for NAME.toml]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Number of branches followed in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -260,7 +260,7 @@ pub struct Explore {
     #[arg(long, value_name = "X", default_value_t = 1e-6)]
     pub tolerance: f64,
     /// Folder for the run [default: runs/explore-NAME for NAME.toml]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Number of threads [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -321,7 +321,7 @@ pub struct New {
     #[arg(long, value_name = "MODEL.toml")]
     pub study: Option<PathBuf>,
     /// Folder for the files [default: TEMPLATE, or that of the model]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
 
@@ -508,7 +508,7 @@ pub struct Exact {
     #[arg(long, value_name = "DIR")]
     pub beside: Option<PathBuf>,
     /// Folder for the run of the exact law [default: DIR-exact]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Number of branches followed in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -525,7 +525,7 @@ pub struct View {
     #[arg(value_name = "DIR|STUDY.toml|MODEL.toml")]
     pub what: Option<PathBuf>,
     /// Folder for the run of a study [default: runs/NAME for NAME.toml]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Number of branches that the run of a study follows in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -826,7 +826,7 @@ pub struct Reproduce {
     #[arg(long, value_name = "N")]
     pub figure: Vec<String>,
     /// Folder for runs, figures and report [default: reproduced/PUBLICATION]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Number of branches followed in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]

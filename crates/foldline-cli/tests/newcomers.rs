@@ -52,6 +52,11 @@ fn a_file_of_another_language_is_recognised() {
     let desk = Desk::new();
     desk.write("model.py", "def f(x):\n    return x\n");
     says(&desk.refused(&["check", "model.py"]), &["this is a Python file", "@foldline.model"]);
+    desk.write("readme.md", "# Title\n\nA program for people.\n");
+    says(&desk.refused(&["run", "readme.md"]), &["this is a Markdown file", "`foldline new oscillator`"]);
+    // A sentence is no key with a value.
+    desk.write("prose.toml", "This program computes diagrams of equations: it continues cycles\n");
+    says(&desk.refused(&["run", "prose.toml"]), &["the file must be TOML"]);
     desk.write("lor.f90", "      SUBROUTINE FUNC(NDIM,U,ICP,PAR)\n");
     says(&desk.refused(&["check", "lor.f90"]), &["this is a Fortran file", "`foldline import-auto`"]);
 }

@@ -12,7 +12,7 @@ pub(crate) struct Slip {
 }
 
 /// Files of other programs, by extension, and what they are.
-const LANGUAGES: [(&[&str], &str); 7] = [
+const LANGUAGES: [(&[&str], &str); 8] = [
     (&["py", "ipynb"], "Python"),
     (&["m", "mlx"], "MATLAB"),
     (&["f", "f90", "for"], "Fortran"),
@@ -20,6 +20,7 @@ const LANGUAGES: [(&[&str], &str); 7] = [
     (&["jl"], "Julia"),
     (&["json"], "JSON"),
     (&["yml", "yaml"], "YAML"),
+    (&["md", "markdown", "rst"], "Markdown"),
 ];
 
 const GENERAL: &str = "the file must be TOML: `key = value`, `[table]`, `[[list]]`; strings are in quotes";
@@ -106,8 +107,15 @@ fn comment(line: &str) -> Option<Slip> {
     told(format!("`{sign}` does not begin a comment"), "write comments with `#`")
 }
 
+/// Largest number of words of a name.
+const LABEL: usize = 4;
+
 /// A line `key = value` with a slip in the key or the value.
 fn assignment(line: &str) -> Option<Slip> {
+    // A key of more words than a label has is a sentence.
+    if line.split(['=', ':']).next().is_some_and(|key| key.split_whitespace().count() > LABEL) {
+        return None;
+    }
     let Some((key, value)) = line.split_once('=') else {
         let (key, value) = line.split_once(':')?;
         return cured(format!("write `{} = {}`", key.trim(), quoted_if_text(uncommented(value).unwrap_or("…"))));
