@@ -291,3 +291,21 @@ x2 = "(0.392+0.423*p)*x0 + (-0.043+-0.551*p)*x1 + (-0.096+0.375*p)*x2 + -1.008*p
     assert_eq!(there.len(), 1, "{there:?}");
     assert!((there[0][0] - 0.1029802999).abs() < 1e-9 && (there[0][1] + 0.0989555757).abs() < 1e-9, "{there:?}");
 }
+
+/// Three decoupled modes: eigenvalues m, (1 + d) m - d, and m - 0.7 d ± i. At m = d/(2 + d) the first two are opposite, a neutral saddle,
+/// 2·10⁻⁵ from the only Hopf point.
+#[test]
+fn a_neutral_saddle_beside_a_hopf_point_is_none() {
+    for d in [1e-5, 1e-4, 1e-3] {
+        let model = format!(
+            "[parameters]\nm = -1\n[states]\nx = \"m*x - x^3\"\ny = \"(1 + {d})*m*y - {d}*y - y^3\"\n\
+             z = \"(m - 0.7*{d})*z - w - z*(z^2 + w^2)\"\nw = \"(m - 0.7*{d})*w + z - w*(z^2 + w^2)\"\n"
+        );
+        let study = "[[seed]]\nname = \"s\"\nstate = \"zero\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"m\"\nrange = [-1, 1]\n";
+        let (text, code) = run(&model, study, "1e-6");
+        let hopf: Vec<f64> = points(&text, "b", "hopf").iter().map(|line| value(line, 2)).collect();
+        assert!(matches!(hopf[..], [one] if (one - 0.7 * d).abs() < 1e-9), "{d}: {hopf:?}");
+        assert!(points(&text, "b", "unexplained").is_empty() && code == Some(0), "{d}: {text}");
+        assert_eq!(points(&text, "b", "branch-point").len(), 2, "{d}: {text}");
+    }
+}

@@ -51,6 +51,16 @@ impl Monitor for Hopf {
         !frequencies(at).is_empty()
     }
 
+    // A neutral saddle, where the product vanishes as well, may be so close to a Hopf point that a pair is nearly on the axis.
+    fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
+        let off = |z: &Complex64| (z.re / z.im).abs();
+        let nearest = at.spectrum.iter().filter(|z| z.im > 0.0).map(off).fold(f64::INFINITY, f64::min);
+        let saddle = opposite(&at.spectrum);
+        // Real eigenvalues that are opposite all along say nothing.
+        let everywhere = ends.iter().all(|end| opposite(&end.spectrum) < OPPOSITE);
+        self.confirms(at) && (everywhere || nearest < OPPOSITE || saddle > CLEAR * nearest)
+    }
+
     fn jump(&self) -> usize {
         2
     }
@@ -67,6 +77,17 @@ impl Monitor for Hopf {
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { (z.re / z.im).abs() })
     }
+}
+
+/// Balance of two real eigenvalues up to which they are opposite to rounding.
+const OPPOSITE: f64 = 1e-9;
+/// Share of the distance of a pair from the axis below which the balance of two real eigenvalues vanishes in its stead.
+const CLEAR: f64 = 1e-3;
+
+/// The smallest balance of two real eigenvalues of opposite sign; infinite if there are none.
+fn opposite(spectrum: &[Complex64]) -> f64 {
+    let real = |(a, b): &(Complex64, Complex64)| a.im == 0.0 && b.im == 0.0 && a.re * b.re < 0.0;
+    pairs(spectrum).filter(real).map(|pair| balance(pair).norm()).fold(f64::INFINITY, f64::min)
 }
 
 /// Indices of all pairs of eigenvalues.
