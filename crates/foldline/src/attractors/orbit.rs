@@ -20,6 +20,8 @@ const STRIDE: usize = 4;
 const COARSE: usize = SAMPLES[0] / STRIDE;
 /// Fraction of its scale against which a component that hardly moves on a cycle is measured.
 const FLOOR: f64 = 1e-3;
+/// Largest distance (1) between orbits of the same period that are the same solution.
+pub(super) const ALIKE: f64 = 0.01;
 
 /// Distance from the stability boundary beyond which a spectrum is conclusive, relative to the largest eigenvalue or,
 /// for multipliers, to 1.
@@ -177,8 +179,8 @@ impl Orbit {
             (Some(a), Some(b)) => {
                 // The period is accurate to the tolerance, the distance only to the sag of the polygon.
                 (a - b).abs() <= 100.0 * tolerance * a
-                    && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < 0.01)
-                    && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < 0.01)
+                    && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < ALIKE)
+                    && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < ALIKE)
             }
             _ => false,
         }
