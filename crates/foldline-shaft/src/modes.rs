@@ -10,11 +10,11 @@
 //! 1. (λ² M + λ D + S) q = 0
 //! 2. [[-ω₀ S⁻¹D, -ω₀² S⁻¹M], [1, 0]] y = (ω₀/λ) y
 //! 3. resonance n:m in the rotating frame: n (ω_f - Ω) = m (ω_b - Ω), backward frequencies negative
-//! 4. real: |Im μ| ≤ √ε max |μ| and |Im μ| < |Re μ|, for the eigenvalues μ of equation 2
+//! 4. real: |Im μ| ≤ √(N ε) max |μ| and |Im μ| < |Re μ|, for the N eigenvalues μ of equation 2
 //!
 //! Real eigenvalues belong to overdamped motions, which do not oscillate and are not modes. Rounding splits a double one
-//! into a pair with imaginary parts of the order √ε, which is the bound of equation 4: the perturbation of a double
-//! eigenvalue grows with the square root of that of the matrix. A mode with less than 0.7 of the critical damping is
+//! into a pair: the perturbation of a double eigenvalue is the square root of that of the matrix, N ε relative to its size
+//! for an algorithm that is backward stable, which gives the bound of equation 4. A mode with less than 0.7 of the critical damping is
 //! never taken for real, however high its frequency.
 //!
 //! **Source.** golub2013, §7.2 (perturbation of multiple eigenvalues).
@@ -249,8 +249,9 @@ fn lowest(all: Vec<Mode>, count: usize) -> Modes {
 /// Eigenvalues of equation 2, those that are real by equation 4 without their imaginary part.
 fn without_rounding(mut values: Vec<Complex64>) -> Vec<Complex64> {
     let largest = values.iter().fold(0.0, |m: f64, mu| m.max(mu.norm()));
+    let split = (values.len() as f64 * f64::EPSILON).sqrt() * largest;
     for mu in &mut values {
-        if mu.im.abs() <= f64::EPSILON.sqrt() * largest && mu.im.abs() < mu.re.abs() {
+        if mu.im.abs() <= split && mu.im.abs() < mu.re.abs() {
             mu.im = 0.0;
         }
     }
