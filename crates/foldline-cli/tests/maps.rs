@@ -404,7 +404,8 @@ fn a_step_that_ends_on_a_branch_point_or_doubling_counts_it_once() {
             );
             let diagram = run(&companion(q, [a, b], 2.346, -0.203), &study);
             let branch = diagram.branch("b").unwrap();
-            let found: Vec<_> = branch.special.iter().map(|own| (own.kind, own.unstable_before, own.unstable_after)).collect();
+            let found: Vec<_> =
+                branch.special.iter().map(|own| (own.kind, own.unstable_before, own.unstable_after)).collect();
             assert!(found.iter().all(|own| own.0 != Kind::Unexplained), "{away}: {found:?}");
             let here: Vec<&SpecialPoint> =
                 branch.special.iter().filter(|own| (own.point.parameters[0] - at).abs() < 1e-6).collect();

@@ -11,7 +11,7 @@ fn foldline(folder: &Path, arguments: &[&str]) -> Output {
 struct Rows {
     heads: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// What the run printed.
+    /// Output of the run.
     said: String,
 }
 
@@ -76,7 +76,12 @@ impl Linear {
 
 /// Smallest and largest x and x' over the last of `periods` forcing periods of a motion that is linear between the
 /// passages of x through `d`: `law` gives the oscillator on each side, and the state after a passage.
-fn exact(d: f64, periods: usize, law: &dyn Fn(bool) -> Linear, after: &dyn Fn([f64; 2]) -> ([f64; 2], bool)) -> [[f64; 2]; 2] {
+fn exact(
+    d: f64,
+    periods: usize,
+    law: &dyn Fn(bool) -> Linear,
+    after: &dyn Fn([f64; 2]) -> ([f64; 2], bool),
+) -> [[f64; 2]; 2] {
     const PARTS: usize = 20_000;
     let period = std::f64::consts::TAU / law(false).omega;
     let (mut state, mut beyond, mut from) = ([0.0, 0.0], false, 0.0);
@@ -211,6 +216,37 @@ restitution = "0.5"
     let found = responses(model, survey, 0);
     assert_eq!((found.all("motion"), found.all("hits")), (vec!["chatter"], vec!["8"]));
     assert!(found.said.contains("ended in chatter") && !found.said.contains("escaped (of"), "{}", found.said);
+    // A sweep from a motion that the forcing lifts off ends at the first value at which it no longer does.
+    let seed = "[[seed]]\nname = \"a\"\nattractor = \"cycle\"\nparameters = { A = 5 }\n";
+    let sweep = "[[sweep]]\nname = \"w\"\nfrom = \"a\"\nfree = \"A\"\nvalues = [5.0, 0.1, 0.05]\n";
+    let found = responses(model, &format!("{seed}{sweep}"), 3);
+    assert_eq!(found.all("motion"), ["cycle", "chatter"]);
+    assert!(found.said.contains("the motion ends in chatter") && !found.said.contains("f jumps"), "{}", found.said);
+}
+
+#[test]
+fn a_cycle_with_impacts_is_listed_once_by_attractors_also_where_a_start_was_followed_further() {
+    let model = r#"units = "labels"
+[parameters]
+A = 1.3
+[forcing]
+frequency = "1"
+[states."x''"]
+equation = "A*cos(t) + 0.5 - 0.1*x' - x"
+range = [-1.0, 0.3]
+velocity = { range = [-1.0, 1.0] }
+[contact.a]
+at = "x"
+clearance = "0.3"
+restitution = "0.7"
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("model.toml"), model).unwrap();
+    let output = foldline(folder.path(), &["attractors", "model.toml", "--samples", "16"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    let cycles: Vec<&str> = said.lines().filter(|line| line.starts_with("cycle")).collect();
+    assert_eq!(cycles.len(), 1, "{said}");
+    assert!(said.contains("followed further"), "{said}");
 }
 
 #[test]
@@ -270,7 +306,8 @@ fn a_sweep_does_not_jump_where_the_branch_turns_just_beyond_the_value() {
     let study = "[[seed]]\nname = \"a\"\nstate = { x = 1.06e-5, v = 1.06e-5 }\n\
                  [[sweep]]\nname = \"s\"\nfrom = \"a\"\nfree = \"p\"\nrange = [3.0, -3.0]\ncount = 11\n";
     let found = responses(&model, study, 0);
-    let jumps: Vec<&str> = (0..11).filter(|row| found.word(*row, "jump") == "jump").map(|row| found.word(row, "p")).collect();
+    let jumps: Vec<&str> =
+        (0..11).filter(|row| found.word(*row, "jump") == "jump").map(|row| found.word(row, "p")).collect();
     assert_eq!(jumps.len(), 1, "{jumps:?}");
     assert!((jumps[0].parse::<f64>().unwrap() + 0.6).abs() < 1e-12, "{jumps:?}");
 }

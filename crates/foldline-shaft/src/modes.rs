@@ -364,10 +364,10 @@ mod tests {
     /// coordinates turned by an angle.
     fn rotor(angle: f64, isotropic: bool) -> Linear {
         let (s, c) = angle.sin_cos();
-        let block = |a: f64, b: f64| [[c * c * a + s * s * b, c * s * (a - b)], [c * s * (a - b), s * s * a + c * c * b]];
-        let whole = |block: [[f64; 2]; 2]| {
-            Mat::from_fn(4, 4, |i, j| if i % 2 == j % 2 { block[i / 2][j / 2] } else { 0.0 })
-        };
+        let block =
+            |a: f64, b: f64| [[c * c * a + s * s * b, c * s * (a - b)], [c * s * (a - b), s * s * a + c * c * b]];
+        let whole =
+            |block: [[f64; 2]; 2]| Mat::from_fn(4, 4, |i, j| if i % 2 == j % 2 { block[i / 2][j / 2] } else { 0.0 });
         let none = || Mat::from_fn(4, 4, |_, _| 0.0);
         Linear {
             speed: 0.0,

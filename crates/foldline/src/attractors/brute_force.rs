@@ -120,11 +120,7 @@ fn like_another(settled: Settled, seen: &[(Vec<f64>, Motion, Recognition)]) -> S
 
 /// Merges responses that agree into one, sorted by decreasing number of hits. Cycles of a vector field come with their
 /// tracks.
-fn grouped(
-    trial: &Trial,
-    parameters: &[f64],
-    all: impl Iterator<Item = (Response, Option<Track>)>,
-) -> Vec<Response> {
+fn grouped(trial: &Trial, parameters: &[f64], all: impl Iterator<Item = (Response, Option<Track>)>) -> Vec<Response> {
     let mut found: Vec<(Response, Option<Track>)> = Vec::new();
     for (response, track) in all {
         let along = |known: &(Response, Option<Track>)| match (&known.1, &track) {

@@ -55,6 +55,14 @@ impl Track {
 
     /// True if the distance of a state from the chord between two samples is within the tolerance.
     fn near(&self, x: &[f64], a: &[f64], b: &[f64]) -> bool {
+        // Most chords are far away in some component.
+        let outside = |(i, size): (usize, &f64)| {
+            let room = ALIKE * size;
+            x[i] < a[i].min(b[i]) - room || x[i] > a[i].max(b[i]) + room
+        };
+        if self.sizes.iter().enumerate().any(outside) {
+            return false;
+        }
         let (mut along, mut length) = (0.0, 0.0);
         for (i, size) in self.sizes.iter().enumerate() {
             let (chord, off) = ((b[i] - a[i]) / size, (x[i] - a[i]) / size);
