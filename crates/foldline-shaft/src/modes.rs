@@ -10,12 +10,14 @@
 //! 1. (λ² M + λ D + S) q = 0
 //! 2. [[-ω₀ S⁻¹D, -ω₀² S⁻¹M], [1, 0]] y = (ω₀/λ) y
 //! 3. resonance n:m in the rotating frame: n (ω_f - Ω) = m (ω_b - Ω), backward frequencies negative
-//! 4. real: |Im μ| ≤ √(N ε) max |μ| and |Im μ| < |Re μ|, for the N eigenvalues μ of equation 2
+//! 4. real: |Im μ| ≤ √(N ε) ‖A‖ and |Im μ| < |Re μ|, for the N eigenvalues μ of the matrix A of equation 2 in coordinates in
+//!    which the diagonal of M is 1
 //!
 //! Real eigenvalues belong to overdamped motions, which do not oscillate and are not modes. Rounding splits a double one
 //! into a pair: the perturbation of a double eigenvalue is the square root of that of the matrix, N ε relative to its size
 //! for an algorithm that is backward stable, which gives the bound of equation 4. A mode with less than 0.7 of the critical damping is
-//! never taken for real, however high its frequency.
+//! never taken for real, however high its frequency. The lowest modes are those with the smallest |λ|, whose eigenvalues are
+//! the most accurate.
 //!
 //! **Source.** golub2013, §7.2 (perturbation of multiple eigenvalues).
 //!
@@ -58,7 +60,7 @@ impl Whirl {
 /// Lowest modes at one speed.
 #[derive(Clone, Debug, Default)]
 pub struct Modes {
-    /// By damped frequency.
+    /// By natural frequency |λ|.
     pub modes: Vec<Mode>,
     /// Real eigenvalues in rad/s, of overdamped motions that do not oscillate, the slowest first.
     pub overdamped: Vec<f64>,
@@ -99,7 +101,7 @@ impl Mode {
 }
 
 impl Linear {
-    /// The `count` lowest oscillating modes at this speed, by damped frequency; with shapes if `shapes` is true. `None`
+    /// The `count` lowest oscillating modes at this speed, by natural frequency; with shapes if `shapes` is true. `None`
     /// if the eigenvalues could not be computed.
     pub fn modes(&self, count: usize, shapes: bool) -> Option<Vec<Mode>> {
         self.spectrum(count, shapes).map(|found| found.modes)
@@ -155,7 +157,7 @@ impl Linear {
             true => complex_eigenvectors(a.as_ref()).map(|(values, vectors)| (values, Some(vectors)))?,
             false => (complex_eigenvalues(a.as_ref())?, None),
         };
-        let values = without_rounding(values);
+        let values = without_rounding(values, self.scaled_size(2 * n, |i, j| a[(i, j)].norm()));
         let back = |mu: Complex64| if inverted { unit / mu } else { unit * mu };
         let forward = if self.speed < 0.0 { -1.0 } else { 1.0 };
         let mode = |(k, mu): (usize, &Complex64)| {
@@ -187,7 +189,7 @@ impl Linear {
             return None;
         }
         let (values, vectors) = eigenvectors(a.as_ref())?;
-        let values = without_rounding(values);
+        let values = without_rounding(values, self.scaled_size(2 * n, |i, j| a[(i, j)].abs()));
         let back = |mu: Complex64| if inverted { unit / mu } else { unit * mu };
         let upper = values.iter().enumerate().map(|(k, mu)| (k, back(*mu))).filter(|(_, value)| value.im >= 0.0);
         let modes = upper.map(|(k, value)| {
@@ -195,6 +197,19 @@ impl Linear {
             Mode { value, whirl: self.whirl(&shape), shape: self.normalised(shape) }
         });
         Some(modes.collect())
+    }
+
+    /// ‖A‖ of equation 4: the Frobenius norm of the matrix of equation 2, of this order and with entries of these sizes, in
+    /// coordinates in which the diagonal of M is 1, so that it does not depend on units.
+    fn scaled_size(&self, order: usize, entry: impl Fn(usize, usize) -> f64) -> f64 {
+        let (half, n) = (order / 2, self.mass.nrows());
+        let weight = |i: usize| {
+            let place = i % half * (n / half);
+            self.mass[(place, place)].sqrt()
+        };
+        let weights: Vec<f64> = (0..order).map(weight).collect();
+        let squares = |j: usize| (0..order).map(|i| (weights[i] * entry(i, j) / weights[j]).powi(2)).sum::<f64>();
+        (0..order).map(squares).sum::<f64>().sqrt()
     }
 
     /// Direction in which the stations move. Those that move less than 1e-6 of the largest do not count.
@@ -236,20 +251,19 @@ pub(crate) fn folded(a: &Mat<f64>) -> Mat<Complex64> {
     Mat::from_fn(a.nrows() / 2, a.ncols() / 2, |i, j| Complex64::new(a[(2 * i, 2 * j)], a[(2 * i + 1, 2 * j)]))
 }
 
-/// The lowest oscillating modes, by damped frequency, and the real eigenvalues.
+/// The lowest oscillating modes, by natural frequency, and the real eigenvalues.
 fn lowest(all: Vec<Mode>, count: usize) -> Modes {
     let (real, mut modes): (Vec<Mode>, Vec<Mode>) = all.into_iter().partition(|mode| mode.value.im == 0.0);
-    modes.sort_by(|a, b| a.value.im.total_cmp(&b.value.im));
+    modes.sort_by(|a, b| a.natural().total_cmp(&b.natural()));
     modes.truncate(count);
     let mut overdamped: Vec<f64> = real.into_iter().map(|mode| mode.value.re).collect();
     overdamped.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
     Modes { modes, overdamped }
 }
 
-/// Eigenvalues of equation 2, those that are real by equation 4 without their imaginary part.
-fn without_rounding(mut values: Vec<Complex64>) -> Vec<Complex64> {
-    let largest = values.iter().fold(0.0, |m: f64, mu| m.max(mu.norm()));
-    let split = (values.len() as f64 * f64::EPSILON).sqrt() * largest;
+/// Eigenvalues of equation 2, those that are real by equation 4 without their imaginary part; `size` is ‖A‖.
+fn without_rounding(mut values: Vec<Complex64>, size: f64) -> Vec<Complex64> {
+    let split = (values.len() as f64 * f64::EPSILON).sqrt() * size;
     for mu in &mut values {
         if mu.im.abs() <= split && mu.im.abs() < mu.re.abs() {
             mu.im = 0.0;

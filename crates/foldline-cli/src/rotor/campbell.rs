@@ -40,11 +40,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
 
 /// Says that overdamped motions, if there are any, are not listed.
 fn note(overdamped: &[f64], rotor: &Loaded, speed: f64) -> Result<(), Failure> {
-    let [slowest, .., fastest] = overdamped else { return Ok(()) };
+    let (Some(slowest), Some(fastest)) = (overdamped.first(), overdamped.last()) else { return Ok(()) };
     let (name, unit) = rotor.speed_label();
     let (count, at) = (overdamped.len(), rotor.shown_speed(speed));
     report(format_args!(
-        "note: {count} real eigenvalues at {name} = {at} {unit}, from {slowest:.6} to {fastest:.6} 1/s, belong to overdamped \
+        "note: real eigenvalues at {name} = {at} {unit} ({count}, from {slowest:.4e} to {fastest:.4e} 1/s) belong to overdamped \
          motions, which do not oscillate; they are not among the modes"
     ))?;
     Ok(())
