@@ -141,11 +141,9 @@ impl Returns {
         // An event may have taken the state across the plane since the end of the last step; that is no crossing.
         let from = self.normal.iter().zip(&self.anchor).enumerate();
         let before: f64 = from.map(|(i, (c, a))| c * (step.start(i) - a)).sum();
-        if !(before < 0.0) {
-            return false;
-        }
-        let value = self.value(end);
-        if !(value >= 0.0) {
+        let value = if before < 0.0 { self.value(end) } else { f64::NAN };
+        let crosses = before < 0.0 && value >= 0.0;
+        if !crosses {
             return false;
         }
         let along = step.along(&self.normal);
