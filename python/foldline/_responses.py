@@ -76,7 +76,8 @@ class Responses(Mapping[str, Any]):
     def motion(self) -> np.ndarray[Any, Any]:
         """Type of each motion, shape (responses,).
 
-        ``"equilibrium"``, ``"cycle"``, ``"torus"``, ``"chaos"``, ``"other"`` (undecided; the column ``"undecided"`` says why) or ``"escaped"``.
+        ``"equilibrium"``, ``"cycle"``, ``"torus"``, ``"chaos"``, ``"other"`` (undecided; the column ``"undecided"`` says why),
+        ``"chatter"`` (its impacts accumulate) or ``"escaped"``.
         Columns ``"rotation"``, ``"exponent"`` and their errors hold the evidence for a torus or chaos.
         """
         own: np.ndarray[Any, Any] = self._table["motion"]

@@ -381,7 +381,7 @@ impl Page<'_> {
         for own in &set.responses {
             // What rests or has escaped passes no level.
             let still = own.motion == Motion::Equilibrium && plane != Plane::Stroboscopic;
-            if own.motion == Motion::Escaped || still {
+            if own.motion.is_lost() || still {
                 continue;
             }
             let found = section(model, &own.state, &own.parameters, plane, count, &way);
@@ -413,7 +413,7 @@ impl Page<'_> {
             Failure::typed("there is no survey or sweep whose spectra could be shown", cure)
         };
         let set = *self.simulated(x).first().ok_or_else(none)?;
-        let settled = |own: &&Response| own.motion != Motion::Escaped;
+        let settled = |own: &&Response| !own.motion.is_lost();
         let mut periods: Vec<f64> = set.responses.iter().filter(settled).filter_map(|own| own.period).collect();
         periods.sort_by(f64::total_cmp);
         let median = periods.get(periods.len() / 2).copied();

@@ -57,6 +57,7 @@ mod shaft;
 mod shortfalls;
 mod smoothed_laws;
 mod stiff;
+mod surveys;
 mod susceptible;
 mod switched_starts;
 mod tables;

@@ -369,3 +369,51 @@ fn orbits_are_simulated_and_attractors_listed() {
     let said = text(&foldline(folder.path(), &["attractors", "m.toml", "--samples", "16"]));
     assert!(said.contains("3.000000000") && said.contains("0 not settled"), "{said}");
 }
+
+/// A planar map with the fixed point 0, whose linear part has trace `q + b p` and determinant `p + a q` in coordinates in
+/// which it is a companion matrix, seen in rotated, bent coordinates. It has a multiplier 1 where 1 - trace + determinant
+/// vanishes, and -1 where 1 + trace + determinant does.
+fn companion(q: f64, [a, b]: [f64; 2], turn: f64, bend: f64) -> String {
+    let (s, c) = turn.sin_cos();
+    format!(
+        "[parameters]\np = 0.0\nq = {q:?}\n[definitions]\nD = \"p + ({a:?})*q\"\nT = \"q + ({b:?})*p\"\n\
+         u = \"({c:?})*X + ({s:?})*Y\"\ny = \"(-{s:?})*X + ({c:?})*Y\"\nx = \"u - ({bend:?})*y^2\"\n\
+         fy = \"-D*x + T*y + 0.494*x^2 + 0.646*x*y - 0.465*y^2 - 0.825*x^3\"\ngu = \"y + ({bend:?})*fy^2\"\n\
+         [states]\nX = {{ range = [-1.0, 1.0] }}\nY = {{ range = [-1.0, 1.0] }}\n\
+         [map]\nX = \"({c:?})*gu - ({s:?})*fy\"\nY = \"({s:?})*gu + ({c:?})*fy\"\n"
+    )
+}
+
+#[test]
+fn a_step_that_ends_on_a_branch_point_or_doubling_counts_it_once() {
+    let [q, a, b] = [-0.19041051435988968, -0.116, -0.12];
+    // 1 - (q + b p) + p + a q = 0 and 1 + (q + b p) + p + a q = 0.
+    let branching = (q - a * q - 1.0) / (1.0 - b);
+    let doubling = (-q - a * q - 1.0) / (1.0 + b);
+    for (kind, at, counts) in [(Kind::BranchPoint, branching, [2, 1]), (Kind::PeriodDoubling, doubling, [1, 0])] {
+        let mut seen = 0;
+        // The first steps are 0.02, 0.04, … of the scale of the parameter, so that a start a round distance away has a step that
+        // ends there; sums of powers of two are exact.
+        for away in [0.2125, 0.1, 0.05, 0.25] {
+            let study = format!(
+                "parameters = {{ p = {:?} }}\n[[seed]]\nname = \"s\"\nstate = \"zero\"\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [{:?}, {:?}]\n",
+                at - away,
+                at - away - 0.05,
+                at + 0.06
+            );
+            let diagram = run(&companion(q, [a, b], 2.346, -0.203), &study);
+            let branch = diagram.branch("b").unwrap();
+            let found: Vec<_> =
+                branch.special.iter().map(|own| (own.kind, own.unstable_before, own.unstable_after)).collect();
+            assert!(found.iter().all(|own| own.0 != Kind::Unexplained), "{away}: {found:?}");
+            let here: Vec<&SpecialPoint> =
+                branch.special.iter().filter(|own| (own.point.parameters[0] - at).abs() < 1e-6).collect();
+            assert_eq!(here.len(), 1, "{away}: {found:?}");
+            assert_eq!((here[0].kind, [here[0].unstable_before, here[0].unstable_after]), (kind, counts), "{away}");
+            assert!((here[0].point.parameters[0] - at).abs() <= here[0].error, "{away}");
+            seen += 1;
+        }
+        assert_eq!(seen, 4);
+    }
+}

@@ -195,3 +195,68 @@ fn commands_for_rotors_refuse_what_is_no_rotor() {
     assert_eq!(code, 2);
     assert!(err.contains("not a range of speeds"), "{err}");
 }
+
+#[test]
+fn overdamped_motions_are_not_among_the_lowest_modes() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = folder.path().join("m.toml");
+    // Internal damping makes motions of the short elements overdamped: real at rest, and turning with the shaft otherwise.
+    let text = r#"
+[parameters]
+Om = 100.0
+[rotor]
+speed = "Om"
+frame = "fixed"
+[[material]]
+name = "m"
+E = 2.046e11
+nu = 0.313
+density = 3266.0
+internal-damping = 1.93e-5
+[[shaft]]
+length = 0.692
+elements = 2
+diameter = 0.0529
+material = "m"
+[[shaft]]
+length = 0.207
+elements = 3
+diameter = 0.0387
+material = "m"
+[[disc]]
+node = 3
+mass = 27.883
+Id = 0.40647
+Ip = 0.33215
+[[bearing]]
+node = 0
+k = 2.5e7
+c = 536.3
+[[bearing]]
+node = 1
+k = 1.1e6
+c = 100.4
+"#;
+    std::fs::write(&model, text).unwrap();
+    let typed = |modes| {
+        let speeds = ["--speeds", "0:400", "--count", "2", "--modes", modes, "--format", "csv"];
+        foldline(&[&["campbell", model.to_str().unwrap()][..], &speeds].concat())
+    };
+    let (out, err, code) = typed("4");
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("real eigenvalues at Om = 0 rad/s"), "{err}");
+    let rows: Vec<Vec<&str>> = out.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    assert_eq!(rows.len(), 8, "{out}");
+    let number = |row: &[&str], column: usize| row[column].parse::<f64>().unwrap();
+    for row in &rows {
+        assert!(number(row, 5) < 0.5, "a mode that oscillates: {row:?}");
+    }
+    // At rest both directions of whirl have one frequency.
+    for pair in rows[..4].chunks(2) {
+        assert!((number(&pair[0], 3) / number(&pair[1], 3) - 1.0).abs() < 1e-9, "{pair:?}");
+    }
+    // All modes are listed in the end, the overdamped ones of the turning shaft among them.
+    let (out, ..) = typed("100");
+    let turning = out.lines().skip(1).filter(|line| line.starts_with("400")).count();
+    assert_eq!(turning, 22, "{out}");
+}

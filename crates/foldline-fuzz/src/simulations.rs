@@ -50,7 +50,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     assert_eq!(hits, STARTS * VALUES, "starts of\n{model}");
     for response in &survey.responses {
         match response.motion {
-            Motion::Escaped => seen.escaped += response.hits,
+            Motion::Escaped | Motion::Chatter => seen.escaped += response.hits,
             Motion::Equilibrium | Motion::Cycle => seen.settled += response.hits,
             Motion::Torus | Motion::Chaos | Motion::Other => {}
         }
@@ -58,7 +58,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     for name in ["from given", "from sampled"] {
         let Some(sweep) = diagram.response_set(name) else { continue };
         seen.swept += 1;
-        let escaped = sweep.responses.last().is_some_and(|last| last.motion == Motion::Escaped);
+        let escaped = sweep.responses.last().is_some_and(|last| last.motion.is_lost());
         assert!(escaped || sweep.responses.len() == VALUES, "{name} of\n{model}");
     }
     let parameters = study.model.defaults();

@@ -11,7 +11,7 @@ use crate::responses::{response_layers, value};
 use crate::sections::{Cloud, branch_layers, cloud_layers};
 use crate::space::{Space, View};
 use crate::theme::{Theme, black, themed};
-use foldline::diagram::{Diagram, Motion};
+use foldline::diagram::Diagram;
 use foldline::explore::replay::Plane;
 use foldline::model::Model;
 use foldline::special::quantity::{Quantity, append, appended};
@@ -139,7 +139,7 @@ pub fn space_panel(diagram: &Diagram, model: &Model, picture: &Picture, z: Quant
     let place = |point: &foldline::diagram::Point| Some([drawn(x, point)?, drawn(y, point)?, drawn(z, point)?]);
     let at = |own: &foldline::diagram::Response| Some([value(x, own)?, value(y, own)?, value(z, own)?]);
     let motions = |set: &foldline::diagram::Responses| -> Vec<[f64; 3]> {
-        set.responses.iter().filter(|own| own.motion != Motion::Escaped).filter_map(at).collect()
+        set.responses.iter().filter(|own| !own.motion.is_lost()).filter_map(at).collect()
     };
     let of_branches = diagram.branches.iter().flat_map(|branch| branch.points.iter().filter_map(place));
     let all: Vec<[f64; 3]> = of_branches.chain(diagram.responses.iter().flat_map(motions)).collect();

@@ -55,7 +55,7 @@ fn set_layers(set: &Responses, x: Quantity, y: Quantity, colour: &'static str) -
         return iterate_layers(set, x, state, colour);
     }
     let at = |r: &Response| {
-        let shown = r.motion != Motion::Escaped;
+        let shown = !r.motion.is_lost();
         value(x, r).zip(value(y, r)).filter(|_| shown).map(|(x, y)| [x, y])
     };
     let settled = |r: &&Response| matches!(r.motion, Motion::Equilibrium | Motion::Cycle);

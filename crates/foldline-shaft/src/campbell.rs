@@ -11,7 +11,7 @@
 //! the speed found, until the speed no longer changes.
 
 use crate::machine::Machine;
-use crate::modes::{Mode, Whirl, synchronous};
+use crate::modes::{Mode, Modes, Whirl, synchronous};
 use num_complex::Complex64;
 
 /// Relative change of a speed at which its iteration ends.
@@ -44,11 +44,11 @@ impl Machine {
     }
 
     /// The `count` lowest modes at each of the speeds in rad/s. `None` where eigenvalues could not be computed.
-    pub fn campbell(&self, parameters: &[f64], speeds: &[f64], count: usize) -> Vec<Option<Vec<Mode>>> {
+    pub fn campbell(&self, parameters: &[f64], speeds: &[f64], count: usize) -> Vec<Option<Modes>> {
         if self.constant() {
             return self.linear(parameters).modes_over(speeds, count);
         }
-        let modes = |speed: &f64| self.linear(&self.at_speed(parameters, *speed)).modes(count, false);
+        let modes = |speed: &f64| self.linear(&self.at_speed(parameters, *speed)).spectrum(count, false);
         speeds.iter().map(modes).collect()
     }
 

@@ -31,7 +31,7 @@ pub use assembly::{Assembly, Of, Refusal, Term};
 pub use campbell::Critical;
 pub use equations::{Assembled, SPEED};
 pub use machine::{Linear, Load, Machine};
-pub use modes::{Mode, Whirl};
+pub use modes::{Mode, Modes, Whirl};
 pub use parts::{
     Bearing, Centre, Coefficient, Contact, Damping, Disc, Element, Film, Force, Frame, Given, Law, PointMass, Rotor,
     Station, Unbalance,

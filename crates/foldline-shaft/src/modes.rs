@@ -10,6 +10,16 @@
 //! 1. (λ² M + λ D + S) q = 0
 //! 2. [[-ω₀ S⁻¹D, -ω₀² S⁻¹M], [1, 0]] y = (ω₀/λ) y
 //! 3. resonance n:m in the rotating frame: n (ω_f - Ω) = m (ω_b - Ω), backward frequencies negative
+//! 4. real: |Im μ| ≤ √(N ε) ‖A‖ and |Im μ| < |Re μ|, for the N eigenvalues μ of the matrix A of equation 2 in coordinates in
+//!    which the diagonal of M is 1
+//!
+//! Real eigenvalues belong to overdamped motions, which do not oscillate and are not modes. Rounding splits a double one
+//! into a pair: the perturbation of a double eigenvalue is the square root of that of the matrix, N ε relative to its size
+//! for an algorithm that is backward stable, which gives the bound of equation 4. A mode with less than 0.7 of the critical damping is
+//! never taken for real, however high its frequency. The lowest modes are those with the smallest |λ|, whose eigenvalues are
+//! the most accurate.
+//!
+//! **Source.** golub2013, §7.2 (perturbation of multiple eigenvalues).
 //!
 //! **Fails when** modes lie far above the lowest one: an eigenvalue r times the lowest loses a factor r² of accuracy. If
 //! S is singular (a rotor without supports), the eigenvalue problem is solved for λ/ω₀, and the lowest modes are less
@@ -47,6 +57,15 @@ impl Whirl {
     }
 }
 
+/// Lowest modes at one speed.
+#[derive(Clone, Debug, Default)]
+pub struct Modes {
+    /// By natural frequency |λ|.
+    pub modes: Vec<Mode>,
+    /// Real eigenvalues in rad/s, of overdamped motions that do not oscillate, the slowest first.
+    pub overdamped: Vec<f64>,
+}
+
 /// Mode of the linear rotor in the fixed frame.
 #[derive(Clone, Debug)]
 pub struct Mode {
@@ -82,25 +101,30 @@ impl Mode {
 }
 
 impl Linear {
-    /// The `count` lowest oscillating modes at this speed, by damped frequency; with shapes if `shapes` is true. `None`
+    /// The `count` lowest oscillating modes at this speed, by natural frequency; with shapes if `shapes` is true. `None`
     /// if the eigenvalues could not be computed.
     pub fn modes(&self, count: usize, shapes: bool) -> Option<Vec<Mode>> {
+        self.spectrum(count, shapes).map(|found| found.modes)
+    }
+
+    /// The modes of [`Linear::modes`] with the real eigenvalues, which are not modes.
+    pub fn spectrum(&self, count: usize, shapes: bool) -> Option<Modes> {
         Some(lowest(if self.isotropic { self.circular(shapes)? } else { self.elliptic()? }, count))
     }
 
     /// The `count` lowest modes at each of several speeds, for matrices that do not depend on the speed. Products with
     /// the inverse of K are computed once. `None` where eigenvalues could not be computed.
-    pub(crate) fn modes_over(&self, speeds: &[f64], count: usize) -> Vec<Option<Vec<Mode>>> {
+    pub(crate) fn modes_over(&self, speeds: &[f64], count: usize) -> Vec<Option<Modes>> {
         let n = self.mass.nrows();
         let each = |speed: &f64| Linear { speed: *speed, ..self.clone() };
         let rotates = (0..n).any(|i| (0..n).any(|j| self.internal[(i, j)] != 0.0));
         if rotates || !self.isotropic {
-            return speeds.iter().map(|speed| each(speed).modes(count, false)).collect();
+            return speeds.iter().map(|speed| each(speed).spectrum(count, false)).collect();
         }
         let [m, c, g, k] = [&self.mass, &self.damping, &self.gyroscopic, &self.stiffness].map(folded);
         let ([flexible, damped], [_, turned]) = (flexibility(&m, &c, &k), flexibility(&m, &g, &k));
         let Some(unit) = unit(&flexible, &m, &k) else {
-            return speeds.iter().map(|speed| each(speed).modes(count, false)).collect();
+            return speeds.iter().map(|speed| each(speed).spectrum(count, false)).collect();
         };
         let half = n / 2;
         let mut own = self.clone();
@@ -112,7 +136,7 @@ impl Linear {
         speeds.iter().map(modes).collect()
     }
 
-    /// Modes of an isotropic rotor.
+    /// Modes of an isotropic rotor, and its real eigenvalues as modes with Im λ = 0.
     fn circular(&self, shapes: bool) -> Option<Vec<Mode>> {
         let n = self.mass.nrows() / 2;
         let i = Complex64::I;
@@ -133,6 +157,7 @@ impl Linear {
             true => complex_eigenvectors(a.as_ref()).map(|(values, vectors)| (values, Some(vectors)))?,
             false => (complex_eigenvalues(a.as_ref())?, None),
         };
+        let values = without_rounding(values, self.scaled_size(2 * n, |i, j| a[(i, j)].norm()));
         let back = |mu: Complex64| if inverted { unit / mu } else { unit * mu };
         let forward = if self.speed < 0.0 { -1.0 } else { 1.0 };
         let mode = |(k, mu): (usize, &Complex64)| {
@@ -153,7 +178,7 @@ impl Linear {
         Some(values.iter().enumerate().map(mode).collect())
     }
 
-    /// Modes of any rotor. The direction of whirl needs the shapes, so they are always computed.
+    /// Modes of any rotor, and its real eigenvalues. The direction of whirl needs the shapes, so they are always computed.
     fn elliptic(&self) -> Option<Vec<Mode>> {
         let n = self.mass.nrows();
         let turned = crate::assembly::turned(&self.internal);
@@ -164,13 +189,27 @@ impl Linear {
             return None;
         }
         let (values, vectors) = eigenvectors(a.as_ref())?;
+        let values = without_rounding(values, self.scaled_size(2 * n, |i, j| a[(i, j)].abs()));
         let back = |mu: Complex64| if inverted { unit / mu } else { unit * mu };
-        let upper = values.iter().enumerate().map(|(k, mu)| (k, back(*mu))).filter(|(_, value)| value.im > 0.0);
+        let upper = values.iter().enumerate().map(|(k, mu)| (k, back(*mu))).filter(|(_, value)| value.im >= 0.0);
         let modes = upper.map(|(k, value)| {
             let shape: Vec<Complex64> = (0..n).map(|j| vectors[(j, k)]).collect();
             Mode { value, whirl: self.whirl(&shape), shape: self.normalised(shape) }
         });
         Some(modes.collect())
+    }
+
+    /// ‖A‖ of equation 4: the Frobenius norm of the matrix of equation 2, of this order and with entries of these sizes, in
+    /// coordinates in which the diagonal of M is 1, so that it does not depend on units.
+    fn scaled_size(&self, order: usize, entry: impl Fn(usize, usize) -> f64) -> f64 {
+        let (half, n) = (order / 2, self.mass.nrows());
+        let weight = |i: usize| {
+            let place = i % half * (n / half);
+            self.mass[(place, place)].sqrt()
+        };
+        let weights: Vec<f64> = (0..order).map(weight).collect();
+        let squares = |j: usize| (0..order).map(|i| (weights[i] * entry(i, j) / weights[j]).powi(2)).sum::<f64>();
+        (0..order).map(squares).sum::<f64>().sqrt()
     }
 
     /// Direction in which the stations move. Those that move less than 1e-6 of the largest do not count.
@@ -212,12 +251,25 @@ pub(crate) fn folded(a: &Mat<f64>) -> Mat<Complex64> {
     Mat::from_fn(a.nrows() / 2, a.ncols() / 2, |i, j| Complex64::new(a[(2 * i, 2 * j)], a[(2 * i + 1, 2 * j)]))
 }
 
-/// The lowest oscillating modes, by damped frequency.
-fn lowest(mut modes: Vec<Mode>, count: usize) -> Vec<Mode> {
-    modes.retain(|mode| mode.value.im > 1e-9 * mode.value.norm());
-    modes.sort_by(|a, b| a.value.im.total_cmp(&b.value.im));
+/// The lowest oscillating modes, by natural frequency, and the real eigenvalues.
+fn lowest(all: Vec<Mode>, count: usize) -> Modes {
+    let (real, mut modes): (Vec<Mode>, Vec<Mode>) = all.into_iter().partition(|mode| mode.value.im == 0.0);
+    modes.sort_by(|a, b| a.natural().total_cmp(&b.natural()));
     modes.truncate(count);
-    modes
+    let mut overdamped: Vec<f64> = real.into_iter().map(|mode| mode.value.re).collect();
+    overdamped.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
+    Modes { modes, overdamped }
+}
+
+/// Eigenvalues of equation 2, those that are real by equation 4 without their imaginary part; `size` is ‖A‖.
+fn without_rounding(mut values: Vec<Complex64>, size: f64) -> Vec<Complex64> {
+    let split = (values.len() as f64 * f64::EPSILON).sqrt() * size;
+    for mu in &mut values {
+        if mu.im.abs() <= split && mu.im.abs() < mu.re.abs() {
+            mu.im = 0.0;
+        }
+    }
+    values
 }
 
 /// S⁻¹M and S⁻¹D.
@@ -316,4 +368,48 @@ pub(crate) fn synchronous(at: &Linear) -> Option<Vec<(Whirl, f64)>> {
     }
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two displacements in each direction with the modal matrices diag(1, 4) of stiffness and diag(2, 0.04) of damping, in
+    /// coordinates turned by an angle.
+    fn rotor(angle: f64, isotropic: bool) -> Linear {
+        let (s, c) = angle.sin_cos();
+        let block =
+            |a: f64, b: f64| [[c * c * a + s * s * b, c * s * (a - b)], [c * s * (a - b), s * s * a + c * c * b]];
+        let whole =
+            |block: [[f64; 2]; 2]| Mat::from_fn(4, 4, |i, j| if i % 2 == j % 2 { block[i / 2][j / 2] } else { 0.0 });
+        let none = || Mat::from_fn(4, 4, |_, _| 0.0);
+        Linear {
+            speed: 0.0,
+            mass: whole(block(1.0, 1.0)),
+            damping: whole(block(2.0, 0.04)),
+            internal: none(),
+            gyroscopic: none(),
+            stiffness: whole(block(1.0, 4.0)),
+            nodes: 0,
+            isotropic,
+        }
+    }
+
+    #[test]
+    fn the_double_eigenvalue_of_critical_damping_is_no_mode() {
+        for isotropic in [true, false] {
+            for k in 0..40 {
+                let found = rotor(0.157 * k as f64, isotropic).spectrum(8, false).unwrap();
+                // λ = -1 twice for one mode in each direction, and λ = -0.02 ± i √(4 - 0.02²) for the other.
+                assert_eq!(found.modes.len(), 2, "{isotropic} {k}: {:?}", found.modes);
+                for mode in &found.modes {
+                    let off = mode.value - Complex64::new(-0.02, (4.0f64 - 0.0004).sqrt());
+                    assert!(off.norm() < 1e-12, "{isotropic} {k}: {}", mode.value);
+                }
+                // Rounding moves a double eigenvalue by its square root.
+                assert!(found.overdamped.iter().all(|own| (own + 1.0).abs() < 1e-6), "{:?}", found.overdamped);
+                assert_eq!(found.overdamped.len(), if isotropic { 2 } else { 4 });
+            }
+        }
+    }
 }

@@ -94,14 +94,22 @@ fn unanswered(diagram: &Diagram, design: &DesignPlan, model: &Model) -> Option<S
     Some(format!("{}: {what}\n{}", design.name, found.reasons.join("\n")))
 }
 
-/// Message on a sweep whose trajectory escaped before the last value.
+/// Message on a sweep whose trajectory escaped or ended in chatter before the last value.
 fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String> {
     let last = diagram.response_set(&sweep.name)?.responses.last()?;
-    (last.motion == Motion::Escaped).then(|| {
+    let advice = match last.motion {
+        Motion::Chatter => {
+            "what to do: replace the restitution by a stiffness and damping of the contact, whose motions are simulated \
+             through sustained contact"
+        }
+        _ => {
+            "likely cause: the motion loses stability, or its basin becomes narrower than a step of the sweep\nwhat to \
+             do: use smaller steps there, or follow the motion as a branch, which includes unstable parts"
+        }
+    };
+    last.motion.is_lost().then(|| {
         format!(
-            "{}: at {} the motion {}; the sweep ends there, after {} of {} values\nlikely cause: the motion loses \
-             stability, or its basin becomes narrower than a step of the sweep\nwhat to do: use smaller steps there, \
-             or follow the motion as a branch, which includes unstable parts",
+            "{}: at {} the motion {}; the sweep ends there, after {} of {} values\n{advice}",
             sweep.name,
             place(&[(sweep.free, last.value)], model),
             last.fate(),

@@ -112,12 +112,8 @@ fn diagram() -> Diagram {
         period: ratio.map(|_| awkward(7)),
         ratio,
         multiplicity: 2,
-        // A motion that escaped has no ranges.
-        ranges: if motion == Motion::Escaped {
-            Vec::new()
-        } else {
-            vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]]
-        },
+        // A motion that escaped or ended in chatter has no ranges.
+        ranges: if motion.is_lost() { Vec::new() } else { vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]] },
         hits: 7,
         share: Some(Share { hits: 5, of: 9 }),
         jumped: Some(true),
@@ -683,7 +679,7 @@ fn responses_can_be_read_by_name_and_files_without_them_are_read_too() {
             Ok((r.get::<_, i64>(0)?, r.get::<_, f64>(1)?, r.get::<_, f64>(2)?, r.get::<_, i64>(3)?))
         })
         .unwrap();
-    assert_eq!(row, (6, 1.0 / 3.0, 1.0 / 3.0, 2));
+    assert_eq!(row, (7, 1.0 / 3.0, 1.0 / 3.0, 2));
     // As written by earlier versions: without the later columns, then without the tables.
     let later = ["uniform_hits", "uniform_starts", "jumped"];
     later

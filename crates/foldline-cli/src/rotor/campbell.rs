@@ -5,8 +5,9 @@ use crate::arguments::{Campbell as Typed, Frame};
 use crate::failure::{Failure, Outcome};
 use crate::plot::picture;
 use crate::table::{Cell, Column, Style, Table, write};
+use crate::verbosity::report;
 use foldline_plot::{Axis, Figure, Layer, LegendPlace, Panel, figure_svg, palette};
-use foldline_shaft::{Mode, Whirl};
+use foldline_shaft::{Mode, Modes, Whirl};
 use std::io::{BufWriter, Write, stdout};
 
 /// Modes at each speed.
@@ -21,8 +22,12 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     }
     let speeds = rotor.speeds(&typed.speeds, usual_count(typed.format, typed.output.is_some()))?;
     let found = rotor.machine.campbell(&rotor.parameters, &speeds, typed.modes as usize);
-    let rows: Option<Rows> = speeds.iter().zip(found).map(|(speed, modes)| Some((*speed, modes?))).collect();
-    let rows = rows.ok_or_else(|| uncomputed("the natural frequencies"))?;
+    let found: Option<Vec<Modes>> = found.into_iter().collect();
+    let found = found.ok_or_else(|| uncomputed("the natural frequencies"))?;
+    if let Some((speed, own)) = speeds.iter().zip(&found).max_by_key(|(_, own)| own.overdamped.len()) {
+        note(&own.overdamped, &rotor, *speed)?;
+    }
+    let rows: Rows = speeds.iter().zip(found).map(|(speed, own)| (*speed, own.modes)).collect();
     if let Some(file) = &typed.output {
         picture(&figure(typed, &rotor, &rows, unit), file)?;
         return Ok(Outcome::Done);
@@ -31,6 +36,18 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     write(&table(typed, &rotor, &rows, unit), typed.format, &mut out)?;
     out.flush()?;
     Ok(Outcome::Done)
+}
+
+/// Says that overdamped motions, if there are any, are not listed.
+fn note(overdamped: &[f64], rotor: &Loaded, speed: f64) -> Result<(), Failure> {
+    let (Some(slowest), Some(fastest)) = (overdamped.first(), overdamped.last()) else { return Ok(()) };
+    let (name, unit) = rotor.speed_label();
+    let (count, at) = (overdamped.len(), rotor.shown_speed(speed));
+    report(format_args!(
+        "note: real eigenvalues at {name} = {at} {unit} ({count}, from {slowest:.4e} to {fastest:.4e} 1/s) belong to overdamped \
+         motions, which do not oscillate; they are not among the modes"
+    ))?;
+    Ok(())
 }
 
 /// Damped frequency in the requested frame, in rad/s; negative for backward whirl in the rotating frame.
@@ -121,7 +138,9 @@ fn figure(typed: &Typed, rotor: &Loaded, rows: &Rows, unit: f64) -> String {
 /// Prints the shapes of the modes at the speed of the model: one row for each mode and station.
 fn shapes(typed: &Typed, rotor: &Loaded, unit: f64) -> Result<Outcome, Failure> {
     let linear = rotor.machine.linear(&rotor.parameters);
-    let modes = linear.modes(typed.modes as usize, true).ok_or_else(|| uncomputed("the modes"))?;
+    let found = linear.spectrum(typed.modes as usize, true).ok_or_else(|| uncomputed("the modes"))?;
+    note(&found.overdamped, rotor, linear.speed)?;
+    let modes = found.modes;
     let parts = &rotor.machine.assembled.rotor;
     let mut columns = mode_columns(&typed.frequency);
     columns.push(Column::new("node", Style::Word));

@@ -5,8 +5,9 @@
 //! state. Neither uses branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
 
 use super::angles::{self, Rolled};
-use super::measure::response;
+use super::measure::{Measured, response};
 use super::recognition::{Found, Nature};
+use super::same::Track;
 use super::settling::{First, Settled, Trial, settle_or_recognise};
 use super::{Candidate, Sampling, driven, iterated};
 use crate::contract::Verdict;
@@ -17,8 +18,9 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Number of trajectories integrated together.
 const BLOCK: usize = 64;
 /// Tolerance within which motions are the same: in their period, and in the ranges of states relative to scale and
-/// size.
-const SAME: f64 = 1e-4;
+/// size. Cycles that agree in both must also pass through the same states (`same`): two coupled oscillators in phase
+/// and in antiphase agree in all ranges.
+pub(super) const SAME: f64 = 1e-4;
 
 /// Receives the responses at one value as soon as they are known.
 pub type Report<'a> = &'a (dyn Fn(&[Response]) -> Verdict + Sync);
@@ -63,7 +65,7 @@ pub fn survey_by_simulation(
             let share = |number: usize| (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of });
             if trial.field.iterated() {
                 let found = iterated::settled(trial, &own, &starts, free).into_iter().enumerate();
-                let found = grouped(trial, found.map(|(k, own)| Response { share: share(k), ..own }).collect());
+                let found = grouped(trial, &own, found.map(|(k, own)| (Response { share: share(k), ..own }, None)));
                 if report(&found) == Verdict::Stop {
                     stop.store(true, Ordering::Relaxed);
                 }
@@ -80,13 +82,13 @@ pub fn survey_by_simulation(
             let mut seen = Vec::new();
             let counted = |(number, settled): (usize, Settled)| {
                 let settled = like_another(settled, &seen);
-                let found = response(trial, &own, free, &settled).0;
+                let Measured { response: found, track, .. } = response(trial, &own, free, &settled);
                 if matches!(found.motion, Motion::Chaos | Motion::Other) {
                     seen.push((settled.extent, found.motion, found.recognition.clone()));
                 }
-                Response { share: share(number), ..found }
+                (Response { share: share(number), ..found }, track)
             };
-            let found = grouped(trial, settled.into_iter().enumerate().map(counted).collect());
+            let found = grouped(trial, &own, settled.into_iter().enumerate().map(counted));
             if report(&found) == Verdict::Stop {
                 stop.store(true, Ordering::Relaxed);
             }
@@ -116,12 +118,17 @@ fn like_another(settled: Settled, seen: &[(Vec<f64>, Motion, Recognition)]) -> S
     Settled { found: Some(Box::new(found)), ..settled }
 }
 
-/// Merges responses that agree into one, sorted by decreasing number of hits.
-fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
-    let mut found: Vec<Response> = Vec::new();
-    for response in all {
-        match found.iter_mut().find(|known| agree(trial, known, &response)) {
-            Some(known) => {
+/// Merges responses that agree into one, sorted by decreasing number of hits. Cycles of a vector field come with their
+/// tracks.
+fn grouped(trial: &Trial, parameters: &[f64], all: impl Iterator<Item = (Response, Option<Track>)>) -> Vec<Response> {
+    let mut found: Vec<(Response, Option<Track>)> = Vec::new();
+    for (response, track) in all {
+        let along = |known: &(Response, Option<Track>)| match (&known.1, &track) {
+            (Some(known), Some(track)) => track.follows(known),
+            _ => iterated::alike(trial, parameters, &known.0, &response),
+        };
+        match found.iter_mut().find(|known| agree(trial, &known.0, &response) && along(known)) {
+            Some((known, _)) => {
                 known.hits += 1;
                 if let (Some(known), Some(own)) = (&mut known.share, response.share) {
                     known.hits += own.hits;
@@ -134,9 +141,10 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
                     }
                 }
             }
-            None => found.push(response),
+            None => found.push((response, track)),
         }
     }
+    let mut found: Vec<Response> = found.into_iter().map(|(response, _)| response).collect();
     found.sort_by_key(|response| std::cmp::Reverse(response.hits));
     found
 }
@@ -170,7 +178,7 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
 
 /// Returns the responses of a stepped sweep: at the first of `values`, the motion to which the trajectory from `start`
 /// `[n]` settles; at each following value, the motion to which it settles from its last state. The sweep ends early at
-/// a motion that escapes, or when `report` asks to stop. `compare` distinguishes jumps from steep slopes.
+/// a motion that escapes or ends in chatter, or when `report` asks to stop. `compare` distinguishes jumps from steep slopes.
 pub fn stepped_sweep(
     trial: &Trial,
     parameters: &[f64],
@@ -200,11 +208,11 @@ pub fn stepped_sweep(
     for &value in values {
         own[free] = value;
         let Some(settled) = settle_or_recognise(trial, &own, &state, First::Accurate).pop() else { break };
-        let (mut response, candidate) = response(trial, &own, free, &settled);
+        let Measured { mut response, candidate, .. } = response(trial, &own, free, &settled);
         response.jumped = compare(&own, candidate.as_ref());
         state.clone_from(&response.state);
         let stopped = report(std::slice::from_ref(&response)) == Verdict::Stop;
-        let over = stopped || response.motion == Motion::Escaped;
+        let over = stopped || response.motion.is_lost();
         found.push(response);
         if over {
             break;

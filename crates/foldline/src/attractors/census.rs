@@ -331,6 +331,7 @@ fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Poin
     let candidate = match settled.motion {
         Motion::Equilibrium => Candidate::Equilibrium(settled.state.clone()),
         Motion::Cycle => context.turn(&settled.state, settled.period),
+        Motion::Chatter => return Err(Lost::Chatter),
         Motion::Escaped if settled.state.iter().all(|x| x.abs() < Response::UNBOUNDED) => return Err(Lost::Stuck),
         Motion::Escaped => return Err(Lost::Escaped),
         // Settling names no other types.

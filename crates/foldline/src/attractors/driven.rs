@@ -14,7 +14,7 @@ use super::census::Pace;
 use super::measure::tolerance;
 use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
-use crate::diagram::{Cycle, Motion, Point, Response, Solution};
+use crate::diagram::{Cycle, Point, Response, Solution};
 use crate::simulation::{Integrator, bordered};
 use std::f64::consts::TAU;
 
@@ -245,7 +245,7 @@ pub(super) fn simulate(
 fn without(response: &Response, driven: &Trial) -> Response {
     let (n, unit) = (driven.field.dim() - 2, driven.field.time_unit(&response.parameters));
     let mut plain = response.clone();
-    if response.motion != Motion::Escaped
+    if !response.motion.is_lost()
         && let Some(state) = at_start_of_period(response, driven)
     {
         plain.state = state;

@@ -7,7 +7,7 @@
 //!
 //! **Fails when** an attractor is not a cycle of at most [`LONGEST`] iterates: its orbits count as unsettled.
 
-use super::brute_force::{Compare, Report};
+use super::brute_force::{Compare, Report, SAME};
 use super::census::Lost;
 use super::recognition::{Nature, recognise};
 use super::settling::Trial;
@@ -206,7 +206,7 @@ impl Iteration<'_> {
             Nature::Torus(_) => Motion::Torus,
             Nature::Chaos => Motion::Chaos,
             Nature::Undecided => Motion::Other,
-            Nature::Lost => Motion::Escaped,
+            Nature::Lost(motion) => *motion,
         };
         match found.nature {
             Nature::Cycle(period) => response.period = Some(period),
@@ -478,6 +478,19 @@ pub(super) fn settled(trial: &Trial, parameters: &[f64], starts: &[f64], free: u
     own.run(starts).iter().map(|ended| response(&own, free, ended).0).collect()
 }
 
+/// True if two motions of a map pass through the same states, whatever iterate they begin with; also for motions that are
+/// not periodic, whose iterates are only some.
+pub(super) fn alike(trial: &Trial, parameters: &[f64], a: &Response, b: &Response) -> bool {
+    if a.motion != Motion::Cycle || a.iterates.is_empty() || a.iterates.len() != b.iterates.len() {
+        return true;
+    }
+    let own = of_trial(trial, parameters);
+    let width = a.ranges.len().max(1);
+    let count = a.iterates.len() / width;
+    let state = |of: &Response, k: usize| of.iterates[k % count * width..][..own.n()].to_vec();
+    (0..count).any(|shift| (0..count).all(|k| own.apart(&state(a, k), &state(b, k + shift)) <= SAME))
+}
+
 /// A stepped sweep of a map; see [`super::stepped_sweep`].
 pub(super) fn stepped_sweep(
     trial: &Trial,
@@ -498,7 +511,7 @@ pub(super) fn stepped_sweep(
         response.jumped = compare(&own, candidate.as_ref());
         state.clone_from(&response.state);
         let stopped = report(std::slice::from_ref(&response)) == Verdict::Stop;
-        let over = stopped || response.motion == Motion::Escaped;
+        let over = stopped || response.motion.is_lost();
         found.push(response);
         if over {
             break;

@@ -1,12 +1,15 @@
 //! Measurement of a settled motion over a further stretch of its trajectory.
 //!
 //! **Idea.** From a state of the motion the trajectory is integrated more accurately than before: a cycle over one
-//! period, until it returns to the plane across its start, and any other motion over a number of steps. The stretch is
-//! sampled uniformly in time; extrema are those of quartics through five samples.
+//! period, until it returns to the plane across its start, and any other motion over a number of steps. Every step is
+//! sampled in equal parts, both ends included; extrema are those of quartics through five samples of one step. Steps end
+//! where f or the state jumps, so that no quartic passes through a jump, and the states on both sides of it are among
+//! the samples.
 
 use super::Candidate;
 use super::recognition::{Found, Nature, recognise};
-use super::settling::{Settled, Trial};
+use super::same::Track;
+use super::settling::{Settled, Trial, lost};
 use super::spectrum::lines;
 use crate::contract::{Batch, Parameters, Verdict};
 use crate::diagram::{Motion, Recognition, Response};
@@ -15,19 +18,53 @@ use num_complex::Complex64;
 
 /// Relative accuracy of the integration.
 const INTEGRATION: f64 = 1e-10;
-/// Samples per period: a parabola through three of them misses the maximum of the k-th harmonic by (2πk/SAMPLES)⁴/128.
+/// Samples per period, at equal times: a parabola through three of them misses the maximum of the k-th harmonic by
+/// (2πk/SAMPLES)⁴/128.
 const SAMPLES: usize = 2048;
+/// Least number of parts into which a step is divided: its continuous solution is a quartic.
+const PARTS: usize = 4;
 /// Number of steps over which a motion that is neither at rest nor periodic is observed.
 const WATCHED: usize = 20_000;
 
-/// Returns the response to which a trajectory settled at the parameter values `parameters`, with one hit, and a
-/// starting point for Newton's method if the motion is at rest or periodic.
-pub(super) fn response(
-    trial: &Trial,
-    parameters: &[f64],
-    free: usize,
-    settled: &Settled,
-) -> (Response, Option<Candidate>) {
+/// Motion to which a trajectory settled.
+pub(super) struct Measured {
+    /// With one hit.
+    pub(super) response: Response,
+    /// A starting point for Newton's method if the motion is at rest or periodic.
+    pub(super) candidate: Option<Candidate>,
+    /// States along a cycle.
+    pub(super) track: Option<Track>,
+}
+
+/// Samples along successive steps of a trajectory.
+#[derive(Default)]
+struct Sampled {
+    /// `[sample][n]`.
+    states: Vec<f64>,
+    /// Number of samples of each step, both ends included.
+    pieces: Vec<usize>,
+}
+
+impl Sampled {
+    /// A single state.
+    fn state(x: &[f64]) -> Sampled {
+        Sampled { states: x.to_vec(), pieces: vec![1] }
+    }
+
+    /// Adds the step up to a fraction `end` of it, in parts no longer than `longest`.
+    fn add(&mut self, step: &Step, end: f64, longest: f64, x: &mut [f64]) {
+        let length = end * (step.end_time() - step.start_time()).abs();
+        let parts = ((length / longest).ceil() as usize).clamp(PARTS, SAMPLES);
+        for part in 0..=parts {
+            step.state_into(end * part as f64 / parts as f64, x);
+            self.states.extend_from_slice(x);
+        }
+        self.pieces.push(parts + 1);
+    }
+}
+
+/// Measures the motion to which a trajectory settled at the parameter values `parameters`.
+pub(super) fn response(trial: &Trial, parameters: &[f64], free: usize, settled: &Settled) -> Measured {
     let mut response = Response {
         value: parameters.get(free).copied().unwrap_or(0.0),
         parameters: parameters.to_vec(),
@@ -45,21 +82,28 @@ pub(super) fn response(
         iterates: Vec::new(),
         recognition: Recognition::default(),
     };
-    let candidate = match settled.motion {
-        Motion::Escaped => None,
+    let cycle = match settled.motion {
+        Motion::Escaped | Motion::Chatter => None,
         Motion::Equilibrium => {
-            response.ranges = ranges(trial, parameters, &settled.state);
-            Some(Candidate::Equilibrium(settled.state.clone()))
+            response.ranges = ranges(trial, parameters, &Sampled::state(&settled.state));
+            let candidate = Some(Candidate::Equilibrium(settled.state.clone()));
+            return Measured { response, candidate, track: None };
         }
         Motion::Cycle => cycle(trial, parameters, settled, &mut response),
         // Only recognition finds the other types, and it comes last.
         Motion::Other | Motion::Torus | Motion::Chaos => unsettled(trial, parameters, settled, &mut response),
     };
-    (response, candidate)
+    let (candidate, track) = cycle.unzip();
+    Measured { response, candidate, track }
 }
 
 /// Recognises a motion that neither rests nor repeated itself.
-fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
+fn unsettled(
+    trial: &Trial,
+    parameters: &[f64],
+    settled: &Settled,
+    response: &mut Response,
+) -> Option<(Candidate, Track)> {
     let found = match &settled.found {
         Some(found) => Found::clone(found),
         None => recognise(trial, parameters, &settled.state, false),
@@ -78,8 +122,8 @@ fn unsettled(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mu
         }
         Nature::Chaos => response.motion = Motion::Chaos,
         Nature::Undecided => {}
-        Nature::Lost => {
-            response.motion = Motion::Escaped;
+        Nature::Lost(motion) => {
+            response.motion = motion;
             return None;
         }
     }
@@ -93,7 +137,7 @@ pub(super) fn tolerance(trial: &Trial) -> Tolerance {
 }
 
 /// Integrates over one period, from the start to the return through the plane across its velocity there.
-fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
+fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<(Candidate, Track)> {
     let n = trial.field.dim();
     let start = &settled.state;
     let mut normal = vec![0.0; n];
@@ -102,7 +146,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     normal.iter_mut().zip(&settled.extent).for_each(|(f, e)| *f /= e * e);
     let side = |x: &[f64]| -> f64 { (0..n).map(|i| normal[i] * (x[i] - start[i])).sum() };
     let (mut states, mut back) = (Vec::with_capacity(SAMPLES * n), None);
-    let (mut x, mut before) = (vec![0.0; n], 0.0);
+    let (mut along, mut x) = (Sampled::default(), vec![0.0; n]);
     let spacing = settled.period / SAMPLES as f64;
     if spacing.is_nan() || spacing <= 0.0 {
         response.motion = Motion::Other;
@@ -113,23 +157,26 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     let run = Ensemble::new(trial.field, parameters, tolerance(trial), start, span);
     let arrivals = run.run(&mut |step| {
         sample(step, spacing, &mut states, n);
+        // An event may have taken the state across the plane since the end of the last step; that is no return.
+        step.start_into(&mut x);
+        let before = side(&x);
         step.end_into(&mut x);
         let here = side(&x);
         if before < 0.0 && here >= 0.0 && step.end_time() > 0.98 * settled.period {
             let theta = crossing(step, &side, &mut x);
-            step.state_into(theta, &mut x);
+            along.add(step, theta, spacing, &mut x);
             back = Some((step.time_at(theta), x.clone()));
             return Verdict::Stop;
         }
-        before = here;
+        along.add(step, 1.0, spacing, &mut x);
         Verdict::Continue
     });
-    if arrivals.iter().any(|arrival| arrival.outcome.is_lost()) {
-        response.motion = Motion::Escaped;
+    if let Some(motion) = arrivals.iter().find_map(|arrival| lost(arrival.outcome)) {
+        response.motion = motion;
         return None;
     }
     states.truncate(SAMPLES * n);
-    response.ranges = ranges(trial, parameters, &states);
+    response.ranges = ranges(trial, parameters, &along);
     let Some((period, state)) = back else {
         // The trajectory does not return, so it had not settled.
         response.motion = Motion::Other;
@@ -149,7 +196,8 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     states.truncate(times.len() * n);
     times.push(period);
     states.extend_from_slice(&response.state);
-    Some(Candidate::Cycle { period, times, states })
+    let track = Track::new(along.states, along.pieces, trial.scales);
+    Some((Candidate::Cycle { period, times, states }, track))
 }
 
 /// Returns the fraction of the step at which `side` changes sign.
@@ -178,28 +226,24 @@ fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
 
 /// Records the extrema of a motion that is neither at rest nor periodic by further integration, unless it escapes.
 fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
-    const PARTS: usize = 4;
     let n = trial.field.dim();
-    let (mut states, mut x) = (Vec::new(), vec![0.0; n]);
+    let (mut along, mut x) = (Sampled::default(), vec![0.0; n]);
     let run = Ensemble::new(trial.field, parameters, tolerance(trial), &response.state, [0.0, f64::INFINITY]);
     let arrivals = run.with_step_limit(WATCHED).run(&mut |step| {
-        for part in 1..=PARTS {
-            step.state_into(part as f64 / PARTS as f64, &mut x);
-            states.extend_from_slice(&x);
-        }
+        along.add(step, 1.0, f64::INFINITY, &mut x);
         Verdict::Continue
     });
     let Some(arrival) = arrivals.into_iter().next() else { return };
     response.state = arrival.state;
-    match arrival.outcome.is_lost() {
-        true => response.motion = Motion::Escaped,
-        false => response.ranges = ranges(trial, parameters, &states),
+    match lost(arrival.outcome) {
+        Some(motion) => response.motion = motion,
+        None => response.ranges = ranges(trial, parameters, &along),
     }
 }
 
-/// Returns the smallest and largest value of every state, then of every output, over `states` `[sample][n]`.
-fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
-    let n = trial.field.dim();
+/// Returns the smallest and largest value of every state, then of every output.
+fn ranges(trial: &Trial, parameters: &[f64], along: &Sampled) -> Vec<[f64; 2]> {
+    let (n, states) = (trial.field.dim(), &along.states);
     let count = states.len() / n;
     if count == 0 {
         return Vec::new();
@@ -208,37 +252,50 @@ fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     let mut outputs = vec![0.0; trial.field.output_count() * count];
     let at = Batch { lanes: count, states: &major, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
     trial.field.outputs(at, &mut outputs);
-    major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(extremes).collect()
+    let own = |values: &[f64]| extremes(values, &along.pieces);
+    major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(own).collect()
 }
 
-/// Returns the smallest and largest value, also between samples: a sample that is higher or lower than its neighbours
-/// counts as the extremum of the quartic through it and two samples on either side.
-fn extremes(values: &[f64]) -> [f64; 2] {
+/// Returns the smallest and largest value, also between the samples of each of the pieces, which are equally spaced.
+fn extremes(values: &[f64], pieces: &[usize]) -> [f64; 2] {
     let mut found = values.iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)]);
-    for w in values.windows(5) {
-        let extreme = (w[2] - w[1]) * (w[2] - w[3]) >= 0.0;
-        if !extreme {
-            continue;
-        }
-        // Derivatives at the middle sample, in units of the spacing.
-        let first = (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / 12.0;
-        let second = (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / 12.0;
-        let third = (-w[0] + 2.0 * w[1] - 2.0 * w[3] + w[4]) / 2.0;
-        let fourth = w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
-        let mut t = 0.0;
-        for _ in 0..4 {
-            let slope = first + t * (second + t * (third / 2.0 + t * fourth / 6.0));
-            let bend = second + t * (third + t * fourth / 2.0);
-            t -= slope / bend;
-        }
-        let summit = w[2] + t * (first + t * (second / 2.0 + t * (third / 6.0 + t * fourth / 24.0)));
-        // The extremum must lie between the neighbours and differ from the sample by no more than they do.
-        let near = (w[2] - w[1]).abs().max((w[2] - w[3]).abs());
-        if t.abs() < 1.0 && (summit - w[2]).abs() <= near {
+    let mut rest = values;
+    for count in pieces {
+        let (piece, later) = rest.split_at(*count);
+        for summit in (0..*count).filter_map(|k| summit(piece, k)) {
             found = [found[0].min(summit), found[1].max(summit)];
         }
+        rest = later;
     }
     found
+}
+
+/// Returns the extremum beside a sample that is at least as high, or as low, as its neighbours: that of the quartic
+/// through it and the nearest four.
+fn summit(piece: &[f64], k: usize) -> Option<f64> {
+    let last = piece.len().checked_sub(5)? + 4;
+    let (own, left, right) = (piece[k], piece[k.saturating_sub(1)], piece[(k + 1).min(last)]);
+    if (own - left) * (own - right) < 0.0 {
+        return None;
+    }
+    let first = k.saturating_sub(2).min(last - 4);
+    let w = &piece[first..first + 5];
+    // Derivatives at the middle sample, in units of the spacing.
+    let slope = (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / 12.0;
+    let second = (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / 12.0;
+    let third = (-w[0] + 2.0 * w[1] - 2.0 * w[3] + w[4]) / 2.0;
+    let fourth = w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
+    let start = k as f64 - (first + 2) as f64;
+    let mut t = start;
+    for _ in 0..4 {
+        let slope = slope + t * (second + t * (third / 2.0 + t * fourth / 6.0));
+        let bend = second + t * (third + t * fourth / 2.0);
+        t -= slope / bend;
+    }
+    let summit = w[2] + t * (slope + t * (second / 2.0 + t * (third / 6.0 + t * fourth / 24.0)));
+    // The extremum must lie between the neighbours, within the piece, and differ from the sample by no more than they do.
+    let near = (own - left).abs().max((own - right).abs());
+    ((t - start).abs() < 1.0 && t.abs() <= 2.0 && (summit - own).abs() <= near).then_some(summit)
 }
 
 #[cfg(test)]
@@ -254,7 +311,7 @@ mod tests {
                 .map(|k| std::f64::consts::TAU * k as f64 / 1e6)
                 .map(|a| a.sin() + 0.3 * (2.0 * a - 0.3 * std::f64::consts::TAU / count as f64).sin())
                 .collect();
-            let [low, high] = extremes(&values);
+            let [low, high] = extremes(&values, &[count]);
             let exact = fine.iter().fold([f64::MAX, f64::MIN], |[l, h], v| [l.min(*v), h.max(*v)]);
             (low - exact[0]).abs().max((high - exact[1]).abs())
         };

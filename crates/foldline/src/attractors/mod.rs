@@ -18,7 +18,7 @@
 //! Maps are iterated (`iterated`). A forced field is sampled as autonomous with two more states (`driven`), an angle as a point on a circle (`angles`).
 //!
 //! A second set of modules simulates without solving any equation for the motions it finds (`brute_force`, `settling`,
-//! `runner`, `measure`), for comparison with branches.
+//! `runner`, `measure`, `same`), for comparison with branches.
 //!
 //! Motions that neither rest nor repeat are classified as tori, locked cycles or chaos (`recognition`); a torus so found
 //! may start a branch (`wandering`).
@@ -38,6 +38,7 @@ mod orbit;
 mod recognition;
 mod returns;
 mod runner;
+mod same;
 mod sampling;
 mod settling;
 mod spectrum;

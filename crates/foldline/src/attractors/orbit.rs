@@ -20,6 +20,8 @@ const STRIDE: usize = 4;
 const COARSE: usize = SAMPLES[0] / STRIDE;
 /// Fraction of its scale against which a component that hardly moves on a cycle is measured.
 const FLOOR: f64 = 1e-3;
+/// Largest distance (1) between orbits of the same period that are the same solution.
+pub(super) const ALIKE: f64 = 0.01;
 
 /// Distance from the stability boundary beyond which a spectrum is conclusive, relative to the largest eigenvalue or,
 /// for multipliers, to 1.
@@ -52,15 +54,15 @@ fn half_ranges(states: &[f64], scales: &[f64]) -> Vec<f64> {
 }
 
 /// Returns samples `[sample][n]` at equal distances along the mesh of a cycle, which has resolved its jumps: as many
-/// per interval as the polynomials have nodes, rounded up in total to a multiple of the first of [`SAMPLES`].
+/// parts per interval as the polynomials have nodes, and more if there are fewer in total than the first of [`SAMPLES`], with
+/// both ends of every interval, since the state may jump between two. The last is repeated to a multiple of that number.
 fn along_mesh(cycle: &Cycle) -> Vec<f64> {
-    let intervals = cycle.mesh.len() - 1;
-    let count = (cycle.degree * intervals).next_multiple_of(SAMPLES[0]);
-    let time = |k: usize| {
-        let (j, rest) = (k * intervals / count, k * intervals % count);
-        cycle.mesh[j] + (cycle.mesh[j + 1] - cycle.mesh[j]) * rest as f64 / count as f64
-    };
-    (0..count).flat_map(|k| cycle.state(time(k))).collect()
+    let intervals = cycle.intervals();
+    let parts = cycle.degree.max(SAMPLES[0].div_ceil(intervals.max(1))).max(1);
+    let share = |k: usize| (k / (parts + 1), (k % (parts + 1)) as f64 / parts as f64);
+    let count = intervals * (parts + 1);
+    let samples = (0..count.next_multiple_of(SAMPLES[0])).map(|k| share(k.min(count - 1)));
+    samples.flat_map(|(j, s)| cycle.state_in(j, s)).collect()
 }
 
 impl Orbit {
@@ -177,8 +179,8 @@ impl Orbit {
             (Some(a), Some(b)) => {
                 // The period is accurate to the tolerance, the distance only to the sag of the polygon.
                 (a - b).abs() <= 100.0 * tolerance * a
-                    && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < 0.01)
-                    && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < 0.01)
+                    && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < ALIKE)
+                    && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < ALIKE)
             }
             _ => false,
         }

@@ -31,10 +31,10 @@
 //! cycle attracts by less than 1e-4 over a record. Transient chaos that lasts longer than the record counts as chaos.
 
 use super::birkhoff::{Curve, Samples, average};
-use super::settling::Trial;
+use super::settling::{Trial, lost};
 use super::variation::Varied;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
-use crate::diagram::Recognition;
+use crate::diagram::{Motion, Recognition};
 use crate::simulation::{Clocked, Ensemble, Tolerance};
 use std::f64::consts::TAU;
 
@@ -71,8 +71,8 @@ pub(super) enum Nature {
     Torus(Quasi),
     Chaos,
     Undecided,
-    /// The trajectory could not be continued.
-    Lost,
+    /// The trajectory could not be continued: it escaped or ended in chatter.
+    Lost(Motion),
 }
 
 /// A quasi-periodic motion.
@@ -101,6 +101,8 @@ struct Record {
     states: Vec<f64>,
     growth: Vec<f64>,
     steps: usize,
+    /// Type of motion if the trajectory could not be continued.
+    lost: Option<Motion>,
 }
 
 /// Observes a trajectory of the trial from a state on; each record takes at most the steps of the limit. `brief` keeps to the
@@ -125,8 +127,8 @@ pub(super) fn recognise(trial: &Trial, parameters: &[f64], state: &[f64], brief:
     while count <= most && (count as f64) * interval <= limits.time && !field.ended() {
         let Some(record) = watch.record(&state, interval, count, limits.steps) else { break };
         if record.states.len() < count * n {
-            let found =
-                Found { nature: Nature::Lost, evidence: Recognition::default(), state: back(&state, own.is_some()) };
+            let nature = Nature::Lost(record.lost.unwrap_or(Motion::Escaped));
+            let found = Found { nature, evidence: Recognition::default(), state: back(&state, own.is_some()) };
             return if record.steps >= limits.steps { last.unwrap_or(undecided(LIMIT)) } else { found };
         }
         state = record.states[(count - 1) * n..].to_vec();
@@ -251,7 +253,8 @@ impl Watch<'_> {
             if states.len() < count * n { Verdict::Continue } else { Verdict::Stop }
         });
         let steps = arrivals.first().map_or(0, |arrival| arrival.steps + arrival.rejected);
-        Some(Record { states, growth, steps })
+        let lost = arrivals.first().and_then(|arrival| lost(arrival.outcome));
+        Some(Record { states, growth, steps, lost })
     }
 
     fn tolerance_of(&self, dim: usize) -> Tolerance {
@@ -286,7 +289,7 @@ impl Watch<'_> {
             states.extend_from_slice(&x);
             growth.push(sum);
         }
-        Record { states, growth, steps: count }
+        Record { states, growth, steps: count, lost: None }
     }
 
     /// Applies the criteria to a record.

@@ -56,8 +56,6 @@ pub(super) struct Returns {
     normal: Vec<f64>,
     /// `[n]` distances from the anchor within which a crossing counts; empty if the whole plane is used.
     reach: Vec<f64>,
-    /// Last value of the plane's equation.
-    side: f64,
     total: usize,
     times: Vec<f64>,
     /// `[return][n]`.
@@ -140,19 +138,22 @@ impl Returns {
 
     /// Records a crossing in the direction of the normal within the step. Returns true if there was one.
     pub(super) fn follow(&mut self, step: &Step, end: &[f64]) -> bool {
-        let value = self.value(end);
-        let before = std::mem::replace(&mut self.side, value);
-        if !(before < 0.0 && self.side >= 0.0) {
+        // An event may have taken the state across the plane since the end of the last step; that is no crossing.
+        let from = self.normal.iter().zip(&self.anchor).enumerate();
+        let before: f64 = from.map(|(i, (c, a))| c * (step.start(i) - a)).sum();
+        let value = if before < 0.0 { self.value(end) } else { f64::NAN };
+        let crosses = before < 0.0 && value >= 0.0;
+        if !crosses {
             return false;
         }
         let along = step.along(&self.normal);
         // Secant iteration on the continuous solution, kept within the bracket (Illinois method).
-        let ([mut a, mut b], [mut ga, mut gb]) = ([0.0, 1.0], [before, self.side]);
+        let ([mut a, mut b], [mut ga, mut gb]) = ([0.0, 1.0], [before, value]);
         let mut theta = 1.0;
         for _ in 0..20 {
             theta = (gb * a - ga * b) / (gb - ga);
             let g = before + along.change(theta);
-            if g.abs() <= 1e-12 * (self.side - before) {
+            if g.abs() <= 1e-12 * (value - before) {
                 break;
             }
             if g < 0.0 {

@@ -7,7 +7,7 @@
 
 use super::Limits;
 use super::returns::{PART, Prediction, Returns};
-use super::settling::{First, INTEGRATION, Settled, Trial};
+use super::settling::{First, INTEGRATION, Settled, Trial, lost};
 use super::window::Window;
 use crate::contract::{Batch, Parameters, Verdict};
 use crate::diagram::Motion;
@@ -323,12 +323,12 @@ impl Runner {
     pub(super) fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
         self.time += time;
         let extent = self.extent.clone();
-        let gone = outcome.is_lost();
-        if self.found.is_none() && !gone && self.steps >= self.limit {
+        let gone = lost(outcome);
+        if self.found.is_none() && gone.is_none() && self.steps >= self.limit {
             self.found = self.nearly();
         }
-        if self.found.is_none() && (gone || self.steps >= self.limit) {
-            let motion = if gone { Motion::Escaped } else { Motion::Other };
+        if self.found.is_none() && (gone.is_some() || self.steps >= self.limit) {
+            let motion = gone.unwrap_or(Motion::Other);
             self.found = Some(Settled {
                 motion,
                 state: state.clone(),

@@ -22,7 +22,7 @@ use super::recognition::{Found, Nature, recognise};
 use super::runner::{JUMPS, Runner};
 use crate::contract::VectorField;
 use crate::diagram::Motion;
-use crate::simulation::{Ensemble, Tolerance};
+use crate::simulation::{Ensemble, Outcome, Tolerance};
 
 /// Relative accuracy of the integration: in a rough first round, and in all others.
 pub(super) const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
@@ -55,6 +55,14 @@ impl Trial<'_> {
     /// Returns the limits in the time unit of the field at these parameters.
     pub(super) fn limits_at(&self, parameters: &[f64]) -> Limits {
         Limits { time: self.limits.time / self.field.time_unit(parameters), ..self.limits }
+    }
+}
+
+/// Type of motion of a trajectory that could not be continued; `None` if it could.
+pub(super) fn lost(outcome: Outcome) -> Option<Motion> {
+    match outcome {
+        Outcome::Chatter => Some(Motion::Chatter),
+        _ => outcome.is_lost().then_some(Motion::Escaped),
     }
 }
 

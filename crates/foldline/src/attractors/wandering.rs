@@ -62,7 +62,7 @@ pub fn first_torus(
             }
             match motion.motion {
                 Motion::Equilibrium | Motion::Cycle => settled += 1,
-                Motion::Escaped => escaped += 1,
+                Motion::Escaped | Motion::Chatter => escaped += 1,
                 _ => {
                     let found = recognise(&watched, parameters, &motion.state, false);
                     match found.nature {
@@ -73,7 +73,7 @@ pub fn first_torus(
                         }
                         Nature::Chaos => chaotic += 1,
                         Nature::Cycle(_) => settled += 1,
-                        Nature::Lost => escaped += 1,
+                        Nature::Lost(_) => escaped += 1,
                         Nature::Undecided => reasons.push(found.evidence.reason),
                     }
                 }

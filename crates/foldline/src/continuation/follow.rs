@@ -305,8 +305,8 @@ impl Follow<'_> {
         Ok((tried, found))
     }
 
-    /// A longer step in place of `tried` if that ends at an equilibrium whose number of unstable eigenvalues rounding decides,
-    /// as beside a branch point, and the longer one does not.
+    /// A longer step in place of `tried` if that ends at an equilibrium, or at a fixed point or cycle of a map, whose number of
+    /// unstable eigenvalues or multipliers rounding decides, as beside a branch point, and the longer one does not.
     fn beyond_rounding(
         &mut self,
         left: &Station,
@@ -315,8 +315,7 @@ impl Follow<'_> {
         tried: Step,
         cost: &mut Cost,
     ) -> Step {
-        let equilibria = left.point.solution.period().is_none();
-        let counts = self.settings.stability && equilibria && tried.end.is_none();
+        let counts = self.settings.stability && left.mesh.is_empty() && tried.end.is_none();
         // Along a family of equilibria rounding decides everywhere.
         if !counts || !self.is_undecided(&tried.right) || self.is_undecided(left) {
             return tried;

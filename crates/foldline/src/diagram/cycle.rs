@@ -152,6 +152,14 @@ impl Cycle {
         out
     }
 
+    /// Returns the state `[n]` at a fraction `s` of interval j, by its own polynomial also at its end.
+    pub(crate) fn state_in(&self, j: usize, s: f64) -> Vec<f64> {
+        let mut x = vec![0.0; self.dim()];
+        let t = self.mesh[j] + s * (self.mesh[j + 1] - self.mesh[j]);
+        self.state_within(self.scheme(), j, t, &mut x);
+        x
+    }
+
     /// Evaluates the state at time `t` in interval j.
     fn state_within(&self, scheme: &Scheme, j: usize, t: f64, x: &mut [f64]) {
         if self.degree == 0 {

@@ -15,14 +15,24 @@ pub enum Motion {
     Chaos,
     /// None of these by the criteria, within the limit on the number of steps; [`Recognition::reason`] says why.
     Other,
-    /// The trajectory ran to infinity or out of the region in which f is defined, or its steps became too small.
+    /// The trajectory ends where its events, such as impacts, accumulate.
+    Chatter,
+    /// The trajectory ran to infinity or out of the region in which f is defined, or its steps became too small. In files
+    /// of version 0.2 and earlier also chatter.
     Escaped,
 }
 
 impl Motion {
     /// All types of motion.
-    pub const ALL: [Motion; 6] =
-        [Motion::Equilibrium, Motion::Cycle, Motion::Torus, Motion::Chaos, Motion::Other, Motion::Escaped];
+    pub const ALL: [Motion; 7] = [
+        Motion::Equilibrium,
+        Motion::Cycle,
+        Motion::Torus,
+        Motion::Chaos,
+        Motion::Other,
+        Motion::Chatter,
+        Motion::Escaped,
+    ];
 
     /// The name used in files and tables.
     pub fn name(self) -> &'static str {
@@ -32,6 +42,7 @@ impl Motion {
             Motion::Torus => "torus",
             Motion::Chaos => "chaos",
             Motion::Other => "other",
+            Motion::Chatter => "chatter",
             Motion::Escaped => "escaped",
         }
     }
@@ -39,6 +50,11 @@ impl Motion {
     /// Returns the motion of that name.
     pub fn from_name(name: &str) -> Option<Motion> {
         Motion::ALL.into_iter().find(|motion| motion.name() == name)
+    }
+
+    /// True if the trajectory could not be continued: it escaped or ended in chatter. Such a motion has no ranges.
+    pub fn is_lost(self) -> bool {
+        matches!(self, Motion::Escaped | Motion::Chatter)
     }
 }
 
@@ -102,9 +118,13 @@ impl Response {
     /// stay far below it, and exponential growth reaches it soon.
     pub(crate) const UNBOUNDED: f64 = 1e12;
 
-    /// Outcome of a trajectory that escaped, in words: it ran to infinity, or could not be integrated beyond its last
-    /// state.
+    /// Outcome of a trajectory that could not be continued, in words: its events accumulate, it ran to infinity, or it
+    /// could not be integrated beyond its last state.
     pub fn fate(&self) -> &'static str {
+        if self.motion == Motion::Chatter {
+            return "ends in chatter: its impacts follow each other ever faster and accumulate; the sustained contact that \
+                    follows is not simulated";
+        }
         match self.state.iter().all(|x| x.abs() < Response::UNBOUNDED) {
             true => "cannot be integrated past a state at which f jumps or is undefined",
             false => "grows without bound",

@@ -90,7 +90,11 @@ fn one_survey(
     let report = |found: &[Response]| count.visited(found);
     let responses = survey_by_simulation(&trial(system, plan, jobs), &sampling, parameters, *free, values, &report);
     let complete = count.done.load(Ordering::Relaxed) >= values.len();
-    if let Some(note) = escapes(&responses, *starts).filter(|_| complete) {
+    let ways = [
+        (Motion::Escaped, "escaped"),
+        (Motion::Chatter, "ended in chatter, where impacts accumulate and sustained contact follows"),
+    ];
+    for note in ways.into_iter().filter_map(|way| losses(&responses, *starts, way)).filter(|_| complete) {
         observer.observe(Event::Note(name, &note));
     }
     complete.then(|| finished(name, Search::Survey, *free, responses, observer))
@@ -101,18 +105,18 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
-/// Returns a note on the number of starts that escaped at each value, if any did.
-fn escapes(responses: &[Response], starts: usize) -> Option<String> {
+/// Returns a note on the number of starts that were lost in one way at each value, if any were.
+fn losses(responses: &[Response], starts: usize, (motion, way): (Motion, &str)) -> Option<String> {
     /// Number of values listed; more would not be read.
     const TOLD: usize = 8;
-    let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
+    let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == motion).collect();
     let told = gone.iter().take(TOLD).map(|r| format!("{} at {}", r.hits, rounded(r.value)));
     let told: Vec<String> = told.collect();
     let more = match gone.len().saturating_sub(TOLD) {
         0 => String::new(),
         more => format!(", and some at {more} more values"),
     };
-    (!gone.is_empty()).then(|| format!("starts that escaped (of {starts}): {}{more}", told.join(", ")))
+    (!gone.is_empty()).then(|| format!("starts that {way} (of {starts}): {}{more}", told.join(", ")))
 }
 
 /// Solution at which a sweep starts.
@@ -168,11 +172,11 @@ fn one_sweep(
     if observer.stopping() {
         return None;
     }
-    let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
-    if let Some(last) = escaped {
+    let lost = responses.last().filter(|last| last.motion.is_lost());
+    if let Some(last) = lost {
         observer.observe(Event::Note(name, &format!("at {} the motion {}", rounded(last.value), last.fate())));
     }
-    let complete = escaped.is_some() || responses.len() == values.len();
+    let complete = lost.is_some() || responses.len() == values.len();
     complete.then(|| finished(name, Search::Sweep, *free, responses, observer))
 }
 
