@@ -14,6 +14,14 @@ FOLDER = os.path.join(ROOT, "python", "notebooks")
 RELATIVE = 1e-4
 
 
+WIDGET = "application/vnd.jupyter.widget-view+json"
+
+
+def shown(out):
+    """False for progress bars, which are widgets where ipywidgets is installed and otherwise written to standard error."""
+    return WIDGET not in out.get("data", {}) and (out.output_type != "stream" or out.name != "stderr")
+
+
 def executed(notebook, folder):
     """Runs a notebook in a folder of its own; leaves out progress bars and times."""
     nbclient = pytest.importorskip("nbclient")
@@ -21,7 +29,7 @@ def executed(notebook, folder):
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
         if cell.cell_type == "code":
-            cell.outputs = [out for out in cell.outputs if out.output_type != "stream" or out.name != "stderr"]
+            cell.outputs = [out for out in cell.outputs if shown(out)]
     return notebook
 
 
