@@ -148,7 +148,7 @@ fn an_unknown_is_determined_by_a_further_condition() {
     }
 }
 
-/// The same where the deflection has the height 1 or 2, upwards or downwards.
+/// Loads of a deflection whose height is 1 or 2, upwards or downwards.
 #[test]
 fn a_beam_between_fixed_supports_carries_the_load_of_its_height() {
     let more = "switch = { branch-point = 1 }\nmark = { w_rms = [0.7071067811865476, 1.4142135623730951] }";
