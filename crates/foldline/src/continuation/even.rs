@@ -19,7 +19,8 @@
 //! of the amplitude. A bound of 1/75 means θ < 1.2: no two zeros of an oscillation, π apart, lie on one piece, nor a zero and the
 //! extremum π/2 beside it.
 //!
-//! **Fails when** the right-hand side of d hardly excites the null vectors, so that the corner is a narrow dip; or an odd number of at least three vanish: the point is then found, but not all branches that leave it.
+//! **Fails when** the right-hand side of d hardly excites the null vectors, so that the corner is a narrow dip; or an odd number of at
+//! least three vanish: the point is then found, but not all branches that leave it.
 
 use super::follow::Follow;
 use super::inspect::History;

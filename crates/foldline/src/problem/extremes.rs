@@ -1,8 +1,9 @@
 //! Smallest and largest values of states and outputs.
 //!
 //! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a
-//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one, and all of them where the state jumps. At the ends of an
-//! interval that is not periodic, the polynomials are continued a little, and only places inside count.
+//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one, and all of them where
+//! the state jumps. At the ends of an interval that is not periodic, the polynomials are continued a little, and only places
+//! inside count.
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};

@@ -15,10 +15,10 @@
 //! Near (1), |x⁺ - x| grows like v and the flight depends on the square root of the distance of the surface: a multiplier
 //! grows without bound like 1/v.
 //!
-//! **Source.** nordmark1991; dibernardo2008, §6.
-//!
 //! After an impact of small speed the motion may return to the surface within a time that is small in proportion to that speed.
 //! Samples are therefore closer together in geometric progression towards both ends of a flight.
+//!
+//! **Source.** nordmark1991; dibernardo2008, §6.
 //!
 //! **Fails when** a flight touches the surface twice between two samples, an eighth of a mesh interval, not next to an event.
 
