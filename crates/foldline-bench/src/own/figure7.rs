@@ -81,7 +81,7 @@ fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
         let _ = problem.factorise(&u, &row);
         total[1] += clock::timed(|| {
             let found = problem.examine(&u);
-            black_box(problem.spectrum_error(&u, &found.spectrum));
+            black_box(problem.spectrum_error(&u, &row, &found.spectrum));
         })
         .0;
     }

@@ -420,7 +420,8 @@ fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
 /// Reports conserved sums of states: with them no solution is isolated, and none can be continued.
 fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     let names: Vec<String> = model.states.iter().map(|state| state.name.clone()).collect();
-    let kept: Vec<String> = conserved(model).iter().map(|c| in_words(c, &names)).collect();
+    let kept: Vec<String> =
+        conserved(model, &model.defaults(), &model.ranges()).iter().map(|c| in_words(c, &names)).collect();
     if kept.is_empty() {
         return;
     }

@@ -325,7 +325,7 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
 
 /// Estimates the error of the spectrum at a station where the problem was factorised last.
 pub fn doubted(problem: &mut dyn ZeroProblem, found: &mut Station) {
-    found.point.trust.spectrum = problem.spectrum_error(&found.u, &found.point.spectrum);
+    found.point.trust.spectrum = problem.spectrum_error(&found.u, &found.tangent, &found.point.spectrum);
 }
 
 /// Largest stated error of a point, in tolerances: the stated error is four times the estimate.

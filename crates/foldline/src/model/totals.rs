@@ -100,7 +100,8 @@ fn sums(whole: &Model, source: &ModelSource) -> Result<Vec<Vec<f64>>, Vec<ModelE
             found.push(complaint(source, i, Field::Expression, message, hint));
         } else if !laws::keeps_its_value(whole, &row) {
             let names: Vec<String> = whole.states.iter().map(|state| state.name.clone()).collect();
-            let kept: Vec<String> = laws::conserved(whole).iter().map(|c| laws::in_words(c, &names)).collect();
+            let kept = laws::conserved(whole, &whole.defaults(), &whole.ranges());
+            let kept: Vec<String> = kept.iter().map(|c| laws::in_words(c, &names)).collect();
             let hint = match kept.is_empty() {
                 true => "no sum of states is conserved here: remove `totals`".to_string(),
                 false => format!("conserved: {}", kept.join(", ")),

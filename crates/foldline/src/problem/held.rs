@@ -419,8 +419,8 @@ impl ZeroProblem for Held<'_> {
         self.surface.denser_mesh()
     }
 
-    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
-        self.surface.spectrum_error(&u[self.extra()..], spectrum)
+    fn spectrum_error(&mut self, u: &[f64], tangent: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.surface.spectrum_error(&u[self.extra()..], &tangent[self.extra()..], spectrum)
     }
 
     fn examine(&mut self, u: &[f64]) -> Examination {

@@ -280,7 +280,7 @@ impl ZeroProblem for MapProblem<'_> {
         Examination { spectrum, trivial: 0, unstable, ranges, averages, trust: Trust { residual, ..Trust::default() } }
     }
 
-    fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {
+    fn spectrum_error(&mut self, _u: &[f64], _tangent: &[f64], spectrum: &[Complex64]) -> f64 {
         // Rounding of every step; it moves two coalescing multipliers by its square root.
         let size = spectrum.iter().fold(1.0f64, |most, z| most.max(z.norm()));
         4.0 * (self.count as f64 * f64::EPSILON).sqrt() * size

@@ -413,8 +413,8 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.stability(u)
     }
 
-    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
-        self.cycles.spectrum_error(u, spectrum)
+    fn spectrum_error(&mut self, u: &[f64], tangent: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.cycles.spectrum_error(u, tangent, spectrum)
     }
 
     fn margin(&self, at: &Point) -> f64 {

@@ -7,6 +7,7 @@ use crate::linalg::condensed::Condensed;
 use crate::linalg::dense::MANY;
 use crate::linalg::system::System;
 use crate::linalg::{larger, panel, same};
+use crate::problem::back_along;
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
 use crate::problem::piecewise::{OneBranch, Switched};
 use crate::stability::floquet;
@@ -135,28 +136,40 @@ impl CycleProblem<'_> {
     /// can cancel, and so can the errors of neighbouring intervals. Every second interval is therefore changed first,
     /// then the others, and the sizes of all changes are added. Identities between multipliers reveal little of this
     /// error, which is large where the Jacobian changes sharply.
-    pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+    pub(super) fn multiplier_error(&self, u: &[f64], tangent: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
         let switched = self.switched(u);
+        let better = self.without_error(u, tangent);
         if self.is_planar() && switched.is_empty() {
             // Error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier,
             // if any.
-            let (own, off) = (self.trace.exp(), self.divergence_error(u));
+            let (own, off) = (self.trace.exp(), self.divergence_error(&better));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + floquet::ROUNDING;
         }
-        let Some(spectra) = self.corrected_multipliers(u, &switched) else { return f64::NAN };
+        let Some(spectra) = self.corrected_multipliers([u, &better], &switched) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
         let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
         SPECTRUM_SAFE * apart + floquet::ROUNDING
     }
 
+    /// `u` without its estimated error, at the same value of the parameter; next to a fold and where two parameters are
+    /// free, the nearest solution of the branch.
+    fn without_error(&self, u: &[f64], tangent: &[f64]) -> Vec<f64> {
+        let known = self.measured.borrow();
+        let Some(known) = known.as_ref() else { return vec![f64::NAN; u.len()] };
+        let back = match self.setting.freedom() {
+            1 => back_along(self, &known.shift, tangent),
+            _ => 0.0,
+        };
+        u.iter().zip(&known.shift).zip(tangent).map(|((u, e), t)| u - e + back * t).collect()
+    }
+
     /// Error of ∫ tr f_x: its difference from the integral over other points of the intervals, along the profile
-    /// corrected by its estimated error.
-    fn divergence_error(&self, u: &[f64]) -> f64 {
+    /// without its estimated error.
+    fn divergence_error(&self, better: &[f64]) -> f64 {
         let known = self.measured.borrow();
         let Some(known) = known.as_ref() else { return f64::NAN };
-        let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
         let (n, size, intervals) = (self.n, self.profile_size(), self.intervals());
         let (points, lanes) = (self.scheme.degree + 1, intervals * (self.scheme.degree + 1));
         let (mut own, mut states) = (vec![0.0; n * lanes], vec![0.0; n * lanes]);
@@ -179,20 +192,19 @@ impl CycleProblem<'_> {
 
     /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile
     /// without its error; before either of them those where every second interval is so.
-    fn corrected_multipliers(&self, u: &[f64], switched: &[Switched]) -> Option<[Vec<Complex64>; 4]> {
+    fn corrected_multipliers(&self, [u, better]: [&[f64]; 2], switched: &[Switched]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
-        let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
         if self.is_localised() {
-            return self.locally_corrected(u, &better, &known.within, switched);
+            return self.locally_corrected(u, better, &known.within, switched);
         }
         let plain = self.transitions();
         if self.is_damped() {
-            let finer = [self.finer_transitions(u, None)?, self.finer_transitions(&better, Some(&known.within))?];
-            return self.spectra_of(&plain, &finer, [u, &better]);
+            let finer = [self.finer_transitions(u, None)?, self.finer_transitions(better, Some(&known.within))?];
+            return self.spectra_of(&plain, &finer, [u, better]);
         }
         let mut transitions = [plain.clone(), plain.clone()];
-        let profiles = [Profile { u, without: None }, Profile { u: &better, without: Some(&known.within) }];
+        let profiles = [Profile { u, without: None }, Profile { u: better, without: Some(&known.within) }];
         let room = &mut *self.room.borrow_mut();
         let mut first = 0;
         while first < self.intervals() {
@@ -205,16 +217,16 @@ impl CycleProblem<'_> {
         }
         let [mut own, mut other] = transitions;
         let (square, block) = (self.n * self.n, self.block());
-        for (transitions, orbit) in [(&mut own, u), (&mut other, &better)] {
+        for (transitions, orbit) in [(&mut own, u), (&mut other, better)] {
             let flow = self.flow(orbit);
             for found in switched {
                 let j = found.interval;
                 let nodes = &orbit[j * block..(j + 1) * block];
-                let refined = flow.refined(found, &nodes[..self.n], self.interval(j), nodes)?;
+                let [_, refined] = flow.refined(found, &nodes[..self.n], self.interval(j), nodes)?;
                 transitions[j * square..(j + 1) * square].copy_from_slice(&refined);
             }
         }
-        self.spectra_of(&plain, &[own, other], [u, &better])
+        self.spectra_of(&plain, &[own, other], [u, better])
     }
 
     /// Multipliers from given transitions and those improved in two ways, in the even intervals first.
@@ -300,7 +312,8 @@ impl CycleProblem<'_> {
         let Defect { mut local, mut within, mut ends, mut sources, mut misses } = whole;
         // An interval in which the orbit switches has the defects of its parts, but where a part is divided, the error
         // of the whole: the divisions are no part of the mesh, and without them the interval may be too long.
-        let (n, inner, count) = (self.n, self.scheme.degree * self.n, self.intervals());
+        let (n, inner, count, block) = (self.n, self.scheme.degree * self.n, self.intervals(), self.block());
+        let flow = self.flow(u);
         for found in self.switched(u).iter() {
             let j = found.interval;
             within.iter_mut().skip(j).step_by(count).for_each(|w| *w = 0.0);
@@ -313,7 +326,13 @@ impl CycleProblem<'_> {
                 missed.iter_mut().zip(&own.misses).for_each(|(all, own)| *all += own);
             }
             local[j] = found.undivided(&errors, self.scheme.degree);
-            ends[j * n..(j + 1) * n].copy_from_slice(&missed);
+            // The defects of the parts add up to the size of what the interval misses; those of a part grow or cancel in
+            // the parts after it.
+            let nodes = &u[j * block..(j + 1) * block];
+            let miss = flow
+                .refined(found, &nodes[..n], self.interval(j), nodes)
+                .map(|[end, _]| found.end.iter().zip(end).map(|(own, finer)| own - finer).collect::<Vec<_>>());
+            ends[j * n..(j + 1) * n].copy_from_slice(miss.as_ref().unwrap_or(&missed));
             misses[j * n..(j + 1) * n].copy_from_slice(&missed);
         }
         let rhs = self.defects_of(&ends, &sources, u.len());

@@ -333,7 +333,7 @@ impl CycleProblem<'_> {
             for found in switched {
                 let j = found.interval;
                 let nodes = &orbit[j * block..(j + 1) * block];
-                let refined = flow.refined(found, &nodes[..n], self.interval(j), nodes)?;
+                let [_, refined] = flow.refined(found, &nodes[..n], self.interval(j), nodes)?;
                 links[j] = Link::Given { inner: Vec::new(), transition: modal(common, &refined, n) };
             }
         }

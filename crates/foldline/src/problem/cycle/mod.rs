@@ -815,10 +815,10 @@ impl ZeroProblem for CycleProblem<'_> {
         found
     }
 
-    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+    fn spectrum_error(&mut self, u: &[f64], tangent: &[f64], spectrum: &[Complex64]) -> f64 {
         match self.is_open() {
             true => self.degeneracy_error(u, spectrum),
-            false => self.multiplier_error(u, spectrum),
+            false => self.multiplier_error(u, tangent, spectrum),
         }
     }
 

@@ -81,7 +81,7 @@ fn both(masses: usize, force: &str, count: usize) -> [(Vec<f64>, Vec<f64>, Vec<f
         problem.solve(&rhs, &mut x);
         let examined = problem.stability(&u);
         let moduli = examined.spectrum.iter().map(|z| z.norm()).collect();
-        let error = problem.spectrum_error(&u, &examined.spectrum);
+        let error = problem.spectrum_error(&u, &row, &examined.spectrum);
         (x, moduli, vec![error, examined.trust.liouville_defect])
     })
 }

@@ -352,17 +352,27 @@ impl<'a> ImpactProblem<'a> {
     }
 
     /// The multipliers on a finer mesh, after a step of Newton's method there; `None` if that fails.
-    fn finer_multipliers(&self, u: &[f64]) -> Option<Vec<Complex64>> {
+    fn finer_multipliers(&self, u: &[f64], tangent: &[f64]) -> Option<Vec<Complex64>> {
         let mesh = self.mesh();
         let fine = super::mesh::denser(&mesh);
         let mut inner = self.fresh(&fine);
-        let mut better = self.with(|own| own.carry(u, &mesh, &fine));
+        let (mut better, mut row) = self.with(|own| (own.carry(u, &mesh, &fine), own.transfer(tangent, &mesh, &fine)));
         inner.anchor(&better);
         let count = better.len();
-        // Any row serves that is not orthogonal to the curve.
-        let row: Vec<f64> = (0..count).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
-        for _ in 0..2 {
+        for round in 0..4 {
             let (mut r, mut step) = (vec![0.0; count], vec![0.0; count]);
+            if round == 2 {
+                // From the nearest solution to the one at the same value of the parameter.
+                let mut shift = vec![0.0; count];
+                shift[count - 1] = u[u.len() - 1] - better[count - 1];
+                let back = super::back_along(&inner, &shift, &row);
+                if back == 0.0 {
+                    break;
+                }
+                better.iter_mut().zip(&row).for_each(|(u, t)| *u += back * t);
+                row.fill(0.0);
+                row[count - 1] = 1.0;
+            }
             if !inner.residual(&better, &mut r) {
                 return None;
             }
@@ -550,8 +560,8 @@ impl ZeroProblem for ImpactProblem<'_> {
         found
     }
 
-    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
-        let Some(finer) = self.finer_multipliers(u) else { return f64::NAN };
+    fn spectrum_error(&mut self, u: &[f64], tangent: &[f64], spectrum: &[Complex64]) -> f64 {
+        let Some(finer) = self.finer_multipliers(u, tangent) else { return f64::NAN };
         SPECTRUM_SAFE * super::cycle::spectrum_difference(spectrum, &finer) + floquet::ROUNDING
     }
 

@@ -744,8 +744,9 @@ impl<'a> PiecewiseFlow<'a> {
         self.switches_given(&x, self.time(begin + s * (end - begin)).as_slice(), signs)[switch]
     }
 
-    /// The transition of an interval from parts of half the length, `[n × n]`: more accurate than its own.
-    pub fn refined(&self, own: &Switched, x: &[f64], [begin, end]: [f64; 2], nodes: &[f64]) -> Option<Vec<f64>> {
+    /// The right end `[n]` and the transition `[n × n]` of an interval from parts of half the length: more accurate than
+    /// its own.
+    pub fn refined(&self, own: &Switched, x: &[f64], [begin, end]: [f64; 2], nodes: &[f64]) -> Option<[Vec<f64>; 2]> {
         let (n, width, interval, sizes) = (self.n(), self.width(), own.interval, &own.sizes);
         let middle = 0.5 * (begin + end);
         let half = |from: [f64; 2]| -> Vec<f64> {
@@ -758,7 +759,8 @@ impl<'a> PiecewiseFlow<'a> {
         let entry = |i: usize, k: usize| {
             (0..n).map(|j| second.end_by[i * width + j] * first.end_by[j * width + k]).sum::<f64>()
         };
-        Some((0..n * n).map(|k| entry(k / n, k % n)).collect())
+        let transition = (0..n * n).map(|k| entry(k / n, k % n)).collect();
+        Some([second.end, transition])
     }
 }
 

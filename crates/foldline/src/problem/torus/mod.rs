@@ -371,7 +371,7 @@ impl ZeroProblem for TorusProblem<'_> {
         found
     }
 
-    fn spectrum_error(&mut self, u: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
+    fn spectrum_error(&mut self, u: &[f64], _tangent: &[f64], _spectrum: &[num_complex::Complex64]) -> f64 {
         self.spectrum_doubt(u)
     }
 
