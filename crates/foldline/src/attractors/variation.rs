@@ -11,6 +11,9 @@
 //!   (2)  g = A v   or, autonomous,   g = A v - (e·A v + v·A e) e
 //! ```
 //!
+//! (2) keeps the component e·v as it is. What integration makes of it would turn into a perturbation as the flow turns,
+//! and so it decays: the states hold v + δ e with δ' = -|A v| δ.
+//!
 //! **Source.** benettin1980; christiansen1997 (continuous normalisation).
 //!
 //! **Fails when** f or the state jumps: the perturbation would have to jump too.
@@ -79,21 +82,23 @@ impl VectorField for Varied<'_> {
             let mut along: Vec<f64> = (0..n).map(|i| f[i * lanes + l] / self.scales[i]).collect();
             let speed = dot(&along, &along).sqrt();
             let free = !self.field.forced() && speed > 0.0;
+            let mut part = 0.0;
             if free {
                 along.iter_mut().for_each(|e| *e /= speed);
-                let part = dot(&along, &v);
+                part = dot(&along, &v);
                 v.iter_mut().zip(&along).for_each(|(v, e)| *v -= part * e);
             }
             let mut g = times(&a, &v);
             let pace = dot(&g, &g).sqrt();
             if free {
-                let part = dot(&along, &g) + dot(&v, &times(&a, &along));
-                g.iter_mut().zip(&along).for_each(|(g, e)| *g -= part * e);
+                let turn = dot(&along, &g) + dot(&v, &times(&a, &along));
+                g.iter_mut().zip(&along).for_each(|(g, e)| *g -= turn * e);
             }
             let length = dot(&v, &v).max(f64::MIN_POSITIVE);
             let rate = dot(&v, &g) / length;
             for i in 0..n {
-                f[(n + i) * lanes + l] = g[i] - rate * v[i] + pace * (1.0 - length) * v[i];
+                f[(n + i) * lanes + l] =
+                    g[i] - rate * v[i] + pace * ((1.0 - length) * v[i] - if free { part * along[i] } else { 0.0 });
             }
             f[2 * n * lanes + l] = rate;
         }
