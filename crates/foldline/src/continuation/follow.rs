@@ -320,7 +320,8 @@ impl Follow<'_> {
         if !counts || !self.is_undecided(&tried.right) || self.is_undecided(left) {
             return tried;
         }
-        for longer in [2.0, 4.0, 8.0, 16.0] {
+        // As little longer as possible: a second special point may follow. No round numbers, as those at which it may lie.
+        for longer in [1.057, 1.31, 2.07, 4.13, 8.3, 16.7] {
             match self.attempt(left, trail, longer * step, rigid, cost) {
                 Ok(beyond) if !self.is_undecided(&beyond.right) => return beyond,
                 Ok(_) => {}

@@ -391,9 +391,9 @@ pub struct Growth<'g> {
 
 /// Number of corners on one side of a branch, after which something is wrong.
 const CORNERS: usize = 32;
-/// Share of the sizes by which a cycle may pass the surface of an event before it counts as no motion: more than points of the
-/// usual tolerances are off.
-const TRESPASS: f64 = 1e-4;
+/// Multiple of its error by which a cycle may pass the surface of an event before it counts as no motion, and the least
+/// such error: rounding.
+const TRESPASS: [f64; 2] = [10.0, 1e-10];
 /// Number of times that a connecting orbit is lengthened on one side of a curve: a bound on the work.
 const LENGTHENINGS: usize = 20;
 /// Points at either end of a branch that always stay whole, since continuation needs them.
@@ -652,6 +652,7 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
+        let on_curve = branch.held.is_some();
         let (free, corners) = (branch.free, branch.held.is_none() && system.holds.is_none() && self.settings.kinks > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let (connecting, line) = (branch.is_connecting(), self.line(branch));
@@ -766,7 +767,8 @@ impl Growth<'_> {
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     if system.field.event_count() > 0 && branch.held.is_none() {
-                        trespassed.replace(impact::trespass([TRESPASS; 2], system.field, &point));
+                        let error = (point.trust.discretisation + point.trust.residual).max(TRESPASS[1]);
+                        trespassed.replace(impact::trespass([TRESPASS[0] * error; 2], system.field, &point));
                         if trespassed.borrow().is_some() {
                             return Verdict::Stop;
                         }
@@ -796,8 +798,19 @@ impl Growth<'_> {
                 let halved = |(_, next): &beside_impacts::Beyond| {
                     doubled && collapse::repeats(&next.point, 100.0 * self.settings.tolerance)
                 };
-                let Some((problem, station)) = beyond.take().filter(|next| !halved(next)) else { break };
-                (other, next) = (Some(problem), Some(station));
+                match beyond.take() {
+                    Some(next) if halved(&next) => break,
+                    Some((problem, station)) => (other, next) = (Some(problem), Some(station)),
+                    None if on_curve => break,
+                    None => {
+                        ending = Ending::GivenUp(
+                            "no cycle with another sequence of impacts was found beside an impact grazing; with a \
+                             smaller tolerance weaker impacts are resolved"
+                                .into(),
+                        );
+                        break;
+                    }
+                }
             }
             let holds = walk.holds && other.is_none();
             let problem = match &mut other {
@@ -856,7 +869,10 @@ impl Growth<'_> {
             };
         }
         if let Some(why) = trespassed.take() {
-            return Ending::GivenUp(format!("the next point is no motion: {why}"));
+            return Ending::GivenUp(format!(
+                "the next point is no motion: {why}; with a smaller tolerance weaker impacts are resolved, unless they \
+                 accumulate (chatter)"
+            ));
         }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
