@@ -8,6 +8,7 @@
 
 use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
+use super::even::Degeneracy;
 use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, head_along, locate};
 use super::opposite::{Around, Exchange};
@@ -57,6 +58,10 @@ const WELL: f64 = 0.75;
 /// Number of parts of a step at whose ends it is cut where a monitor may touch zero: coarse enough for the cut not to depend
 /// on rounding.
 const PLACES: f64 = 16.0;
+
+/// Length of a step along a branch of cycles beyond which, and angle below which, monitors are seen between its ends too: half of
+/// the longest step, and a tenth of the angle at which steps aim.
+const LONG: [f64; 2] = [0.1, 0.025];
 
 /// Values of all monitors at the point before an interval, for the test for tangency.
 #[derive(Clone, Debug)]
@@ -287,9 +292,15 @@ impl Follow<'_> {
             self.touched(h, &at_left, &at_right, stretch.length).or_else(doubled)
         });
         let suspicious = touched.is_some() || depth < 3 && !standing && stretch.may_turn_twice();
-        // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
+        // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap, and
+        // where a branch is straight its solutions do not tell how fast multipliers change.
         let mut seen = cut_there;
-        let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
+        let long = self.settings.stability
+            && stretch.length.abs() > LONG[0]
+            && stretch.turn < LONG[1]
+            && Degeneracy::of(&left.point).is_none();
+        let unknown =
+            history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length) || long;
         if depth == 0 && unknown && seen.is_none() {
             // What is located may lie between two zeros of another monitor.
             let ends = [&at_left[..], &at_right[..]];
@@ -654,11 +665,9 @@ impl Follow<'_> {
         (first, all): (bool, bool),
         cost: &mut Cost,
     ) -> Option<f64> {
-        // No round numbers, at which a monitor may vanish exactly.
-        const PLACES: [f64; 15] = [
-            0.503, 0.252, 0.747, 0.127, 0.374, 0.626, 0.873, 0.0629, 0.188, 0.0303, 0.0151, 0.00707, 0.00303, 0.00101,
-            0.97,
-        ];
+        // Apart from the middle, which may be known, no round numbers: at these a monitor may vanish exactly.
+        const PLACES: [f64; 15] =
+            [0.5, 0.252, 0.747, 0.127, 0.374, 0.626, 0.873, 0.0629, 0.188, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
         let cycles = !stretch.left.mesh.is_empty();
         let count = if first && !cycles { PLACES.len() } else { 3 };
         let differ = |a: f64, b: f64| (a > 0.0) != (b > 0.0);

@@ -45,6 +45,8 @@ pub struct Stretch<'s> {
     slope: Vec<f64>,
     /// Distance of the right station along the tangent of the left.
     pub length: f64,
+    /// Angle between the tangents at the ends, if small.
+    pub(super) turn: f64,
     /// [`Station::midway`] of the right station.
     midway: f64,
     /// [`Station::middle`] of the right station.
@@ -64,8 +66,10 @@ impl<'s> Stretch<'s> {
         let length = problem.dot(&left.tangent, &gap);
         let forward = problem.dot(&left.tangent, &slope);
         slope.iter_mut().for_each(|t| *t /= forward.abs().max(0.1));
+        let change: Vec<f64> = slope.iter().zip(&left.tangent).map(|(a, b)| a - b).collect();
+        let turn = problem.dot(&change, &change).sqrt();
         let (midway, middle) = (right.midway, right.middle.clone());
-        Stretch { left, right: u, slope, length, midway, middle, direction }
+        Stretch { left, right: u, slope, length, turn, midway, middle, direction }
     }
 
     /// Computes the point at distance s on the mesh of the left station.
