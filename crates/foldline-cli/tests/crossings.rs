@@ -309,3 +309,79 @@ fn a_neutral_saddle_beside_a_hopf_point_is_none() {
         assert_eq!(points(&text, "b", "branch-point").len(), 2, "{d}: {text}");
     }
 }
+
+/// Rest is unstable for |l - l0| < w. Branches begin a round number of steps from the Hopf points, so that steps and the places
+/// at which they are examined end exactly on them.
+#[test]
+fn pairs_of_hopf_points_at_round_distances_are_found() {
+    let hopf = |w: f64, l0: f64, far: f64| {
+        let model = format!(
+            "[parameters]\nl = -{far}\n[definitions]\ng = \"({w}^2 - (l - {l0})^2)/({w}^2 + (l - {l0})^2)\"\n\
+             [states]\nx = {{ equation = \"g*x - y - x*(x^2 + y^2)\", range = [-2, 2] }}\n\
+             y = {{ equation = \"g*y + x - y*(x^2 + y^2)\", range = [-2, 2] }}\n"
+        );
+        let (text, code) = run(&model, &followed("{ x = 0, y = 0 }", "l", &format!("[-{far}, {far}]")), "1e-6");
+        assert_eq!(code, 0, "{text}");
+        let found: Vec<f64> = points(&text, "b", "hopf").iter().map(|line| value(line, 2)).collect();
+        assert!(
+            found.len() == 2 && found.iter().all(|l| ((l - l0).abs() - w).abs() < 1e-7 * far),
+            "{w} {l0} {far}: {text}"
+        );
+    };
+    hopf(1.0, 0.0, 10.0);
+    for l0 in [-0.4, -0.15, 0.0, 0.2, 0.45] {
+        hopf(0.1, l0, 1.0);
+        hopf(0.05, l0, 1.0);
+    }
+}
+
+/// x = 0 is a cycle along which nothing but its multipliers changes: exp(0.6 π g), g as above.
+#[test]
+fn pairs_of_branch_points_along_a_straight_branch_of_cycles_are_found() {
+    for (w, l0) in [(0.05, 0.0), (0.03, 0.1), (0.02, -0.3), (0.04, 0.45)] {
+        let model = format!(
+            "[parameters]\nl = -1\n[forcing]\nperiod = \"2*pi\"\n[definitions]\n\
+             g = \"0.3*({w}^2 - (l - {l0})^2)/({w}^2 + (l - {l0})^2)\"\n\
+             [states]\nx = {{ equation = \"g*x - x^3\", range = [-2, 2] }}\ny = {{ equation = \"-y + cos(t)\", range = [-2, 2] }}\n"
+        );
+        let study = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0.5 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"l\"\n\
+                     range = [-1, 1]\n";
+        let (text, code) = run(&model, study, "1e-6");
+        assert_eq!(code, 0, "{text}");
+        let found: Vec<f64> = points(&text, "b", "branch-point").iter().map(|line| value(line, 2)).collect();
+        assert!(found.len() == 2 && found.iter().all(|l| ((l - l0).abs() - w).abs() < 1e-6), "{w} {l0}: {text}");
+    }
+}
+
+/// x = x₀(l) + 0.3 sin 2πt with l = X³ - X: a = ∓3 X₀ = ∓√3 at the folds, where no amplitude grows along the null vector.
+#[test]
+fn the_sign_of_a_null_vector_is_no_error_of_a_coefficient() {
+    for mean in ["0", "3", "300"] {
+        let model = format!(
+            "[parameters]\nl = 0\n[forcing]\nperiod = 1\n[definitions]\nX = \"x - {mean} - 0.3*sin(2*pi*t)\"\n\
+             [states]\nx = {{ equation = \"l - X^3 + X + 0.6*pi*cos(2*pi*t)\", range = [{mean} - 2, {mean} + 2] }}\n"
+        );
+        let mean: f64 = mean.parse().unwrap();
+        let model = model.replace(&format!("[{mean} - 2, {mean} + 2]"), &format!("[{}, {}]", mean - 2.0, mean + 2.0));
+        let study = format!(
+            "[[seed]]\nname = \"s\"\nstate = {{ x = {} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"l\"\nrange = [-1, 1]\n",
+            mean - 1.0
+        );
+        let (text, code) = run(&model, &study, "1e-6");
+        assert_eq!(code, 0, "{text}");
+        let folds = points(&text, "b", "fold");
+        assert!(
+            folds.len() == 2 && folds.iter().all(|line| line.contains("1.7320") || line.contains("1.7321")),
+            "{text}"
+        );
+    }
+}
+
+/// The doubling of the logistic map lies exactly at the end of the range.
+#[test]
+fn a_range_may_end_on_a_special_point() {
+    let logistic = "[parameters]\nr = 2.6\n[states]\nx = { range = [0, 1] }\n[map]\nx = \"r*x*(1 - x)\"\n";
+    let (text, code) = run(logistic, &followed("{ x = 0.6 }", "r", "[2.5, 3]"), "1e-6");
+    assert_eq!(code, 0, "{text}");
+    assert!(!text.contains("unexplained"), "{text}");
+}

@@ -345,6 +345,20 @@ fn accumulating_impacts_end_a_branch_in_words() {
     assert!(matches!(&ended[..], [one] if one.contains("chatter")), "{ended:?}");
 }
 
+/// With e = 0.387, impacts accumulate towards w = 0.8275: the ninth of them begins at w = 0.827847 (closed form of the flights), when
+/// the eighth has 5e-4 of the largest speed. At a tolerance of 1e-5 the branch ends before, because what passes the wall there is
+/// more than the errors of the points.
+#[test]
+fn impacts_that_a_tolerance_does_not_resolve_end_a_branch() {
+    let study = "tolerance = 1e-5\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 24\nparameters = { w = 1.287 }\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.6, 3.2]\nmax-points = 250\n";
+    let diagram = run(&walled([1.0, 0.173, 0.387, 0.0, 1.0, 0.024], 1.0), study);
+    let own = diagram.branch("b").unwrap();
+    assert!(own.points.iter().all(|point| point.ranges[0][1] < 0.024 + 1e-5));
+    let ended = own.ends.iter().flatten().filter(|end| !end.complete()).map(Ending::to_string).collect::<Vec<String>>();
+    assert!(matches!(&ended[..], [one] if one.contains("smaller tolerance")), "{ended:?}");
+}
+
 /// A doubled cycle with one impact in two periods of the force passes the grazing of the motion without impacts, traversed twice, and
 /// comes back with the impact in the other period. (A comparison of its halves led from there to the period doubling at once.)
 #[test]

@@ -13,6 +13,7 @@ use super::inspect::Found;
 use super::step::{Step, Trail};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Connection, Cost, Ending, Kind, Point, STANDS, SpecialPoint};
+use num_complex::Complex64;
 
 /// Output of a run, in the order of travel.
 pub enum Item {
@@ -302,7 +303,52 @@ impl Follow<'_> {
         let tried = self.attempt(left, trail, step, rigid, cost)?;
         let tried = self.beyond_rounding(left, trail, (step, rigid), tried, cost);
         let found = self.examined_between(left, &tried.right, trail, step, cost)?;
-        Ok((tried, found))
+        Ok(if tried.end.is_some() && is_unexplained(&found) {
+            self.on_border(left, trail, step, cost, (tried, found))
+        } else {
+            (tried, found)
+        })
+    }
+
+    /// A last step that ends on a special point itself, to within the errors, as where a doubling lies at a round number at
+    /// which the range ends: the eigenvalues or multipliers on the border are counted so that what lies between is explained.
+    fn on_border(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        step: f64,
+        cost: &mut Cost,
+        (mut tried, found): (Step, Vec<Found>),
+    ) -> (Step, Vec<Found>) {
+        /// Least error that is assumed: the accuracy to which a point is located.
+        const LEAST: f64 = 1e-9;
+        /// Largest distance from the border of the critical eigenvalue or multiplier of what is found.
+        const FOUND: f64 = 1e-7;
+        let border = |point: &Point| -> Vec<f64> {
+            let cycle = point.solution.period().is_some();
+            let off = |z: &Complex64| if cycle { (z.norm() - 1.0) / z.norm().max(1.0) } else { z.re };
+            point.free_spectrum().iter().map(off).collect()
+        };
+        let point = &tried.right.point;
+        let error = if point.trust.spectrum > LEAST { point.trust.spectrum } else { LEAST };
+        let critical: Vec<f64> = border(point).into_iter().filter(|off| off.abs() <= error).collect();
+        let counted = point.unstable;
+        let fewest = counted.saturating_sub(critical.iter().filter(|off| **off > 0.0).count());
+        let there = |item: &Found| match item {
+            Found::Special(special) => border(&special.point).iter().any(|off| off.abs() <= FOUND),
+            Found::Inserted(..) => true,
+        };
+        for count in (fewest..=fewest + critical.len()).filter(|count| *count != counted) {
+            tried.right.point.unstable = count;
+            if let Ok(other) = self.examined_between(left, &tried.right, trail, step, cost)
+                && !is_unexplained(&other)
+                && other.iter().all(there)
+            {
+                return (tried, other);
+            }
+        }
+        tried.right.point.unstable = counted;
+        (tried, found)
     }
 
     /// A longer step in place of `tried` if that ends at an equilibrium, or at a fixed point or cycle of a map, whose number of

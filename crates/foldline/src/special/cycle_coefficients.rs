@@ -40,6 +40,9 @@ const SAFE: f64 = 2.0;
 /// rather than degenerate. Empirical: terms that cancel to less than a hundredth are taken for a true zero.
 const UNKNOWN: f64 = 1e-2;
 
+/// Largest sum of two values, relative to their difference, that differ in the direction of the null vector alone.
+const MIRRORED: f64 = 1e-3;
+
 /// Returns the coefficients of a cycle at a bifurcation point of the given kind. The setting has one free parameter.
 pub fn coefficients(kind: Kind, setting: &Setting, at: &Point) -> Coefficients {
     if !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
@@ -64,7 +67,11 @@ fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, Stri
     let first = on_mesh(at, &resolved).ok_or("its mesh could not be refined")?;
     let second = solved(kind, setting, &first, at, &mesh::denser(&resolved));
     let second = second.ok_or("the point was not found again on a finer mesh")?;
-    let (one, two) = (value(&first)?, value(&second)?);
+    let (mut one, two) = (value(&first)?, value(&second)?);
+    if kind == Kind::Fold && (one.value + two.value).abs() < MIRRORED * (one.value - two.value).abs() {
+        // Along the null vector of a symmetric fold no amplitude grows: rounding decides on its direction.
+        one.value = -one.value;
+    }
     let noise = f64::EPSILON * resolved.len() as f64;
     if two.divisor.abs() <= NOTHING + SAFE * (two.divisor.abs() - one.divisor.abs()).abs() {
         return Err("the change of the period at the fold is zero within its error".into());

@@ -105,7 +105,9 @@ fn number(sign: &str, (a, i): (f64, bool), (b, j): (f64, bool), line: usize) -> 
         // The quotient of integers is one.
         "/" if whole && b != 0.0 => V::Number((a / b).trunc(), true),
         "/" => V::Number(a / b, false),
-        "**" => V::Number(a.powf(b), whole && b >= 0.0),
+        // So is a power: 2**(-1) is 0.
+        "**" if whole && (b >= 0.0 || a != 0.0) => V::Number(a.powf(b).trunc(), true),
+        "**" => V::Number(a.powf(b), false),
         "==" => V::Logical(a == b),
         "!=" => V::Logical(a != b),
         "<" => V::Logical(a < b),
@@ -222,7 +224,13 @@ pub(super) fn intrinsic(name: &str, given: &[V], line: usize) -> Result<Option<V
         ("atan2" | "datan2", [_, _]) => two("atan2", f64::atan2)?,
         ("mod", [V::Number(a, i), V::Number(b, j)]) => V::Number(a % b, *i && *j),
         ("sign", [V::Number(a, i), V::Number(b, _)]) => V::Number(a.abs() * if *b < 0.0 { -1.0 } else { 1.0 }, *i),
-        ("pow" | "pow_dd" | "pow_di", [a, b]) => binary("**", a.clone(), b.clone(), line)?,
+        ("pow" | "pow_dd" | "pow_di", [a, b]) => {
+            let real = match a {
+                V::Number(value, _) => V::Number(*value, false),
+                other => other.clone(),
+            };
+            binary("**", real, b.clone(), line)?
+        }
         ("dot_product", [V::List(a), V::List(b)]) => {
             let mut total = V::Number(0.0, false);
             for (a, b) in a.iter().zip(b) {
