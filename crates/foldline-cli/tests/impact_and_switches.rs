@@ -152,7 +152,8 @@ fn errors_of_multipliers_hold_at_the_same_value_of_the_parameter() {
     let mut compared = 0;
     for own in &some {
         let near = |other: &&&Point| {
-            (other.parameters[0] - own.parameters[0]).abs() < 1e-14 && (other.ranges[0][1] - own.ranges[0][1]).abs() < 1e-4
+            (other.parameters[0] - own.parameters[0]).abs() < 1e-14
+                && (other.ranges[0][1] - own.ranges[0][1]).abs() < 1e-4
         };
         for other in marks.iter().filter(near) {
             let apart = |z: &Complex64| other.spectrum.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);

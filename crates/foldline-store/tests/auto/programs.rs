@@ -31,7 +31,7 @@ fn loops_functions_and_integers_of_fortran_become_plain_equations() {
     let text = "! A ring.\n      SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)\n      IMPLICIT NONE\n      \
         INTEGER, INTENT(IN) :: NDIM, ICP(*), IJAC\n      DOUBLE PRECISION, INTENT(IN) :: U(NDIM), PAR(*)\n      \
         DOUBLE PRECISION F(NDIM), DFDU(NDIM,NDIM), DFDP(NDIM,*), g, z, half, rate(3)\n      INTEGER i, j\n      \
-        g(z) = z*(1 - z)**2\n      half = 1/2 + 1.d0/2\n      DO i = 1, NDIM\n        j = MOD(i, NDIM) + 1\n        \
+        g(z) = z*(1 - z)**2\n      half = 1/2 + 1.d0/2 + 3*2**(-1) + (-1)**(-2) - 2**0\n      DO i = 1, NDIM\n        j = MOD(i, NDIM) + 1\n        \
         CALL SPEED(U(i), PAR(1), &\n     &    rate(i))\n        F(i) = rate(i) - half*(U(i) - U(j))\n      ENDDO\n      \
         F(1) = F(1) + g(U(2))\n      IF(IJAC.EQ.0)RETURN\n      DFDU(1,1) = WHATEVER(U)\n      END SUBROUTINE FUNC\n      \
         SUBROUTINE SPEED(x, k, r)\n      DOUBLE PRECISION x, k, r, w\n      w = k*EXP(-x)\n      r = w - x/3.d0\n      END\n      \
