@@ -1,20 +1,28 @@
 //! Links, anchors and paths in Markdown files.
 
+use crate::release::address;
 use crate::root;
 use crate::tree::Text;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Returns a message for each relative link whose file or anchor does not exist, and for each mentioned path of this
+/// Returns a message for each link into this repository, relative or by its address, whose file or anchor does not exist, and for each mentioned path of this
 /// repository that does not exist.
 pub fn broken(texts: &[Text]) -> Vec<String> {
     let pages: Vec<&Text> = texts.iter().filter(|text| text.is(&["md"])).collect();
+    let own = ["blob", "raw"].map(|kind| format!("{}/{kind}/main/", address()));
     let anchors: HashMap<&str, HashSet<String>> =
         pages.iter().map(|page| (page.name.as_str(), anchors(&page.text))).collect();
     let mut found = Vec::new();
     for page in &pages {
         for (offset, target) in targets(&page.text) {
-            if let Some(reason) = fault(&page.name, target, &anchors) {
+            // A page that is shown elsewhere links to files of this repository by its address.
+            let file = own.iter().find_map(|start| target.strip_prefix(start));
+            let fault = match file {
+                Some(file) => fault("", file, &anchors),
+                None => fault(&page.name, target, &anchors),
+            };
+            if let Some(reason) = fault {
                 found.push(format!("{}: link to {target}: {reason}", page.place(offset)));
             }
         }
