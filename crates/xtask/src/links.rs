@@ -112,6 +112,10 @@ fn targets(text: &str) -> Vec<(usize, &str)> {
             let target = line[at + 2..].split([')', ' ']).next().unwrap_or_default();
             found.push((offset + at, target));
         }
+        // An image with a width.
+        for (at, start) in line.match_indices("<img src=\"").filter(|(at, _)| !code(*at)) {
+            found.push((offset + at, line[at + start.len()..].split('"').next().unwrap_or_default()));
+        }
         if let Some((_, target)) = line.strip_prefix('[').and_then(|line| line.split_once("]: ")) {
             found.push((offset, target.trim()));
         }
@@ -180,9 +184,9 @@ mod tests {
 
     #[test]
     fn links_are_found_outside_code_only() {
-        let text = "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n```text\n[h](i)\n```\n";
+        let text = "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n<img src=\"j.png\" width=\"640\">\n```text\n[h](i)\n```\n";
         let found: Vec<&str> = targets(text).into_iter().map(|(_, target)| target).collect();
-        assert_eq!(found, ["b.md#c", "e.png", "g.md"]);
+        assert_eq!(found, ["b.md#c", "e.png", "g.md", "j.png"]);
     }
 
     #[test]
@@ -192,6 +196,9 @@ mod tests {
         assert_eq!(found("# Here\n[a](../README.md) [b](#here) [c](https://x.y)\ndocs/book/cli.md\n"), [""; 0]);
         assert_eq!(found("\n[a](no.md)\n"), ["docs/x.md:2: link to no.md: there is no such file"]);
         assert_eq!(found("[a](#no)\n"), ["docs/x.md:1: link to #no: the page has no such heading"]);
+        let by_address = |path: &str| format!("[a]({}/blob/main/{path})\n", address());
+        assert_eq!(found(&by_address("docs/book/cli.md")), [""; 0]);
+        assert_eq!(found(&by_address("docs/book/no.md")).len(), 1);
         assert_eq!(found("in docs/no.md.\n"), ["docs/x.md:1: docs/no.md does not exist"]);
         assert_eq!(found("in docs/decisions/0001\n"), [""; 0]);
     }
