@@ -184,7 +184,8 @@ mod tests {
 
     #[test]
     fn links_are_found_outside_code_only() {
-        let text = "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n<img src=\"j.png\" width=\"640\">\n```text\n[h](i)\n```\n";
+        let text =
+            "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n<img src=\"j.png\" width=\"640\">\n```text\n[h](i)\n```\n";
         let found: Vec<&str> = targets(text).into_iter().map(|(_, target)| target).collect();
         assert_eq!(found, ["b.md#c", "e.png", "g.md", "j.png"]);
     }

@@ -88,7 +88,11 @@ fn equation(left: &str) -> Complaint {
         Some((base, order)) if order > 2 => first_order_form(base, order),
         _ => format!("remove `{} =`", left.trim()),
     };
-    Complaint::new(left.len() - left.trim_start().len()..left.len() + 1, "an equation has only its right-hand side here", hint)
+    Complaint::new(
+        left.len() - left.trim_start().len()..left.len() + 1,
+        "an equation has only its right-hand side here",
+        hint,
+    )
 }
 
 /// Says how an equation for a derivative of order above two is written, with a state for each lower derivative.
@@ -98,10 +102,14 @@ fn equation(left: &str) -> Complaint {
 /// assert!(said.contains("`x = \"x1\"`, `x1 = \"x2\"` and `x2 = \"…\"`"));
 /// ```
 pub fn first_order_form(base: &str, order: usize) -> String {
-    let names: Vec<String> = std::iter::once(base.to_string()).chain((1..order).map(|k| format!("{base}{k}"))).collect();
+    let names: Vec<String> =
+        std::iter::once(base.to_string()).chain((1..order).map(|k| format!("{base}{k}"))).collect();
     let steps: Vec<String> = names.windows(2).map(|pair| format!("`{} = \"{}\"`", pair[0], pair[1])).collect();
     let last = names.last().map_or(base, String::as_str);
-    format!("write it in first-order form, with a state for each derivative: {} and `{last} = \"…\"` under [states]", steps.join(", "))
+    format!(
+        "write it in first-order form, with a state for each derivative: {} and `{last} = \"…\"` under [states]",
+        steps.join(", ")
+    )
 }
 
 /// Value and length of the number at the start of `rest`.
