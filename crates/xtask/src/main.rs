@@ -118,28 +118,29 @@ fn words(all: bool) -> bool {
     spelling::right() && faults.is_empty()
 }
 
-/// A program of cargo, which is installed under target if it is not there. It is built without optimisation, which takes
-/// a third of the time.
-fn tool(name: &str, version: &str) -> Option<PathBuf> {
+/// A program of cargo, which is installed under target, with these further arguments, if it is not there.
+fn tool(name: &str, version: &str, further: &[&str]) -> Option<PathBuf> {
     let tools = root().join("target/tools");
     let own = tools.join("bin").join(name);
     let known = Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
     if known {
         return Some(PathBuf::from(name));
     }
-    let install = ["install", name, "--version", version, "--locked", "--debug", "--quiet", "--root"];
-    let there = own.exists() || run(Command::new(cargo_path()).args(install).arg(&tools));
+    let install = ["install", name, "--version", version, "--locked", "--quiet", "--root"];
+    // `cargo install` succeeds without a program if a feature is missing.
+    let there = own.exists() || run(Command::new(cargo_path()).args(install).arg(&tools).args(further)) && own.exists();
     there.then_some(own)
 }
 
-/// The program cargo-deny, in the newest version that was tested.
+/// The program cargo-deny, in the newest version that was tested. It is built without optimisation, which takes a third
+/// of the time.
 fn cargo_deny() -> Option<PathBuf> {
-    tool("cargo-deny", "0.20.2")
+    tool("cargo-deny", "0.20.2", &["--debug"])
 }
 
 /// Writes the licences of what the command and the wheel contain, each as a page.
 fn licences() -> bool {
-    let Some(program) = tool("cargo-about", "0.9.3") else { return false };
+    let Some(program) = tool("cargo-about", "0.9.3", &["--features", "cli"]) else { return false };
     [("foldline-cli", "target/THIRD-PARTY.html"), ("foldline-py", "python/foldline/THIRD-PARTY.html")].iter().all(
         |(part, page)| {
             let manifest = format!("crates/{part}/Cargo.toml");
