@@ -51,7 +51,7 @@ templates_path = []
 
 # Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
 myst_heading_anchors = 4
-myst_enable_extensions = ["deflist"]
+myst_enable_extensions = ["deflist", "html_image"]
 highlight_language = "none"
 
 # Notebooks keep the outputs that are stored in them; python/tests/test_notebooks.py compares these with new ones.

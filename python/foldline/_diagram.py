@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from ._arguments import suggestion
+from ._arguments import suggestion, wrong_kind
 from ._branch import Branch, SpecialPoints, shown_in
 from ._designs import Design
 from ._errors import NoSolution
@@ -50,6 +50,8 @@ class Diagram:
         model: Model | None = None,
         folder: str | None = None,
     ) -> None:
+        if not (isinstance(native, _native.Diagram) or callable(native)):
+            raise wrong_kind("diagrams are results of studies", native, 'foldline.open("runs/study") for a run in a folder')
         self._source = native
         self._model = model
         self.folder = folder

@@ -48,6 +48,8 @@ class Model:
     """
 
     def __init__(self, native: _native.Model) -> None:
+        if not isinstance(native, _native.Model):
+            raise wrong_kind("models are made by the function `foldline.model`", native, 'foldline.model("model.toml")')
         self._native = native
         self.name: str = native.name
         self.description: str = native.description

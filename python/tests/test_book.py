@@ -18,7 +18,11 @@ def examples(path):
     return files, re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page, flags=re.DOTALL)
 
 
-PAGES = ["README.md", *(os.path.join("docs", "book", page) for page in ("first-model.md", "python.md", "tutorial-rotor.md"))]
+PAGES = [
+    "README.md",
+    os.path.join("python", "README.md"),
+    *(os.path.join("docs", "book", page) for page in ("first-model.md", "python.md", "tutorial-rotor.md")),
+]
 
 
 @pytest.mark.parametrize("path", PAGES)

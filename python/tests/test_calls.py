@@ -42,6 +42,8 @@ def calls(brusselator, rest, steady):
         "solution for model": (lambda: foldline.explore(rest, "B", (1, 2)), argument, 'foldline.explore(solution.model, "B", (1, 2))'),
         "branch for model": (lambda: foldline.survey(steady, "B", (1, 2)), argument, "branch.diagram.model"),
         "path for model": (lambda: foldline.explore("m.toml", "B", (1, 2)), argument, "foldline.model('m.toml')"),
+        "class for model": (lambda: foldline.Model("model.toml"), argument, 'foldline.model("model.toml")'),
+        "class for run": (lambda: foldline.Diagram("runs/study"), argument, 'foldline.open("runs/study")'),
         "no range": (lambda: follow(rest, "B"), argument, "the range of `B` is missing"),
         "no range held": (lambda: hold(hopf, "A"), argument, 'foldline.hold(point, "A", (0.5, 4))'),
         "range reversed": (lambda: follow(rest, "B", (4, 0.5)), value, 'foldline.follow(start, "B", (0.5, 4))'),

@@ -63,7 +63,7 @@ fn a_branch_with_close_neighbours_is_the_same_from_any_start() {
 #[test]
 fn a_large_unbalance_leaves_two_folds_on_one_step_and_torus_points_next_to_folds() {
     let model = include_str!("../../../models/overhung-rotor.toml");
-    let text = include_str!("../../../studies/akay2022/light-damping-large-unbalance-contact.toml");
+    let text = include_str!("../../foldline-reproduce/studies/akay2022/light-damping-large-unbalance-contact.toml");
     let study = parse_study(text, "study", model, "model").unwrap_or_else(|f| panic!("{}", f[0]));
     let diagram = run(&System::of_plan(&study.model, &study.plan), &study.plan, 2, Diagram::default(), &Unobserved);
     let is = |name: &str, expected: &[(Kind, f64)]| {

@@ -68,7 +68,7 @@ fn slips_in_toml_are_answered_with_the_line_as_it_should_be() {
         ("mu = 0,5", "`mu = 0.5`"),
         ("mu = .5", "`mu = 0.5`"),
         ("mu: 0.5", "`mu = 0.5`"),
-        ("mu = 1/2", "`mu = \"1/2\"`"),
+        ("mu = 1/2", "`mu = 0.5`"),
         ("mu = 0.5;", "`mu = 0.5`"),
         ("mu = 0.5 // start", "write comments with `#`"),
         ("mu =", "`mu = …`"),
@@ -79,6 +79,7 @@ fn slips_in_toml_are_answered_with_the_line_as_it_should_be() {
     says(&desk.model("\"y\"\nrange", "“y”\nrange"), &["pendulum.toml:9:", "straight quotation marks"]);
     says(&desk.model("\"y\"\nrange", "\"y\nrange"), &["pendulum.toml:9:", "the missing `\"`"]);
     says(&desk.study("\"mu\"", "mu"), &["study.toml:11:8", "text without quotes", "`free = \"mu\"`"]);
+    says(&desk.study("[-1, 2]", "[-1, 2*pi]"), &["study.toml:12:", "`range = [-1.0, 6.283185307179586]`"]);
     says(&desk.study("[-1, 2]", "(-1, 2)"), &["study.toml:12:", "`range = [-1, 2]`"]);
     says(&desk.study("free = \"mu\"", "free = \"mu\"\nfree = \"mu\""), &["study.toml:12:1", "`free` is given twice"]);
     says(&desk.study("\"pendulum.toml\"", "\"sub\\model.toml\""), &["study.toml:1:", "write a path with `/`"]);
@@ -104,6 +105,8 @@ fn notations_of_other_languages_in_an_expression_are_translated() {
         ("π*x", "`pi`"),
         ("x²", "`x^2`"),
         ("x'' = -x", "under [states]"),
+        ("y' = mu*x", "remove `y' =`"),
+        ("dy/dt = mu*x", "remove `dy/dt =`"),
         ("1_000*x", "`1000`"),
         ("alpha*x", "declare it under [parameters]"),
     ] {

@@ -26,15 +26,37 @@ fn blocks(document: &str, kind: &str) -> Vec<String> {
     text.split(&fence).skip(1).filter_map(|rest| Some(rest.split_once("```")?.0.to_string())).collect()
 }
 
-/// Returns a folder with the model and the study of a document.
-fn desk(document: &str) -> tempfile::TempDir {
+const MODEL: &str = r#"name = "Brusselator"
+parameters = { A = 1.0, B = 1.5 }
+
+[states]
+x = { equation = "A - (B + 1)*x + x^2*y", range = [0, 5] }
+y = { equation = "B*x - x^2*y", range = [0, 5] }
+"#;
+
+const STUDY: &str = r#"model = "brusselator.toml"
+seed = [{ name = "rest", attractor = "equilibrium" }]
+branch = [{ name = "steady", from = "rest", free = "B", range = [0.5, 4], switch = { hopf = 1 } }]
+"#;
+
+/// Returns a folder with the Brusselator and a study of it.
+fn desk() -> tempfile::TempDir {
+    written(MODEL, STUDY)
+}
+
+fn written(model: &str, study: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let found = blocks(document, "toml");
-    let model = found.iter().find(|block| block.contains("name = \"Brusselator\"")).expect("a model");
-    let study = found.iter().find(|block| block.contains("model = \"brusselator.toml\"")).expect("a study");
     std::fs::write(folder.path().join("brusselator.toml"), model).unwrap();
     std::fs::write(folder.path().join("study.toml"), study).unwrap();
     folder
+}
+
+/// Returns a folder with the model and the study of a document.
+fn desk_of(document: &str) -> tempfile::TempDir {
+    let found = blocks(document, "toml");
+    let model = found.iter().find(|block| block.contains("name = \"Brusselator\"")).expect("a model");
+    let study = found.iter().find(|block| block.contains("model = \"brusselator.toml\"")).expect("a study");
+    written(model, study)
 }
 
 /// The rows of a CSV table as (column, cell) lookups.
@@ -52,15 +74,14 @@ fn rows(csv: &str) -> Vec<impl Fn(&str) -> String + use<>> {
 }
 
 #[test]
-fn the_first_models_of_readme_and_book_have_their_hopf_point() {
-    for document in ["README.md", "docs/book/first-model.md"] {
-        let desk = desk(document);
+fn the_first_model_has_its_hopf_point_in_one_notation_and_in_the_other() {
+    for (written, desk) in [("inline", desk()), ("as in the book", desk_of("docs/book/first-model.md"))] {
         printed(desk.path(), &["check", "brusselator.toml"], 0);
         let text = printed(desk.path(), &["run", "study.toml", "--jobs", "1"], 0);
         assert!(text.contains("hopf"), "{text}");
         let csv = printed(desk.path(), &["table", "runs/study", "--format", "csv"], 0);
         let heads = "branch,kind,A,B,period,unstable_before,unstable_after,error,normal_form,coefficient_1,coefficient_1_error,";
-        assert!(csv.starts_with(heads), "{document}: {csv}");
+        assert!(csv.starts_with(heads), "{written}: {csv}");
         let hopf = rows(&csv).into_iter().find(|row| row("kind") == "hopf").unwrap();
         // B = 1 + A² = 2; tolerance 1e-6 relative to 1 + |B|.
         assert!((hopf("B").parse::<f64>().unwrap() - 2.0).abs() < 3e-6, "{}", hopf("B"));
@@ -68,7 +89,7 @@ fn the_first_models_of_readme_and_book_have_their_hopf_point() {
         let branches = printed(desk.path(), &["table", "runs/study", "--branches", "--format", "json"], 0);
         let branches: serde_json::Value = serde_json::from_str(&branches).unwrap();
         let families: Vec<&str> = branches.as_array().unwrap().iter().filter_map(|b| b["family"].as_str()).collect();
-        assert_eq!(families, ["equilibrium", "cycle"], "{document}");
+        assert_eq!(families, ["equilibrium", "cycle"], "{written}");
         for ending in ["svg", "png", "pdf"] {
             let file = format!("picture.{ending}");
             printed(desk.path(), &["plot", "runs/study", "-o", &file], 0);
@@ -79,7 +100,7 @@ fn the_first_models_of_readme_and_book_have_their_hopf_point() {
 
 #[test]
 fn points_are_listed_with_multipliers_and_accuracy() {
-    let desk = desk("README.md");
+    let desk = desk();
     printed(desk.path(), &["run", "study.toml"], 0);
     let arguments = ["table", "runs/study", "--points", "--branch", "steady", "--format", "json"];
     let points: serde_json::Value = serde_json::from_str(&printed(desk.path(), &arguments, 0)).unwrap();
@@ -108,7 +129,7 @@ fn points_are_listed_with_multipliers_and_accuracy() {
 
 #[test]
 fn a_branch_that_ends_short_is_reported_with_exit_code_3() {
-    let desk = desk("README.md");
+    let desk = desk();
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
     std::fs::write(desk.path().join("short.toml"), study.replace("range", "max-points = 2, range")).unwrap();
     let output = foldline(desk.path(), &["run", "short.toml"]);
@@ -136,7 +157,7 @@ fn a_branch_that_turns_before_its_target_is_short_and_nothing_starts_at_its_end(
 
 #[test]
 fn a_seed_that_is_not_found_is_reported_with_exit_code_3() {
-    let desk = desk("README.md");
+    let desk = desk();
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
     // At B = 1.5 the equilibrium attracts every state.
     std::fs::write(desk.path().join("none.toml"), study.replace("\"equilibrium\"", "\"cycle\"")).unwrap();
@@ -148,7 +169,7 @@ fn a_seed_that_is_not_found_is_reported_with_exit_code_3() {
 
 #[test]
 fn the_same_study_gives_the_same_table_for_any_number_of_threads() {
-    let desk = desk("README.md");
+    let desk = desk();
     for jobs in ["1", "3"] {
         printed(desk.path(), &["run", "study.toml", "--jobs", jobs, "--out", jobs], 0);
     }
@@ -180,7 +201,7 @@ pub fn cut_off(file: &Path, kept: i64) {
 
 #[test]
 fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
-    let desk = desk("README.md");
+    let desk = desk();
     printed(desk.path(), &["run", "study.toml", "--jobs", "1", "--out", "whole"], 0);
     let table = |out: &str, what: &str| printed(desk.path(), &["table", out, what, "--format", "csv"], 0);
     let special = |out: &str| -> Vec<(String, String, f64)> {
@@ -233,14 +254,14 @@ fn a_closed_branch_killed_between_its_two_ends_is_not_followed_again() {
 
 #[test]
 fn a_finished_run_resumes_without_doing_anything() {
-    let desk = desk("README.md");
+    let desk = desk();
     let first = printed(desk.path(), &["run", "study.toml"], 0);
     assert_eq!(printed(desk.path(), &["run", "study.toml", "--resume"], 0), first);
 }
 
 #[test]
 fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
-    let desk = desk("README.md");
+    let desk = desk();
     let study = "model = \"brusselator.toml\"\n[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\n\
                  [[branch]]\nname = \"steady\"\nfrom = \"rest\"\nfree = \"B\"\nrange = [0.5, 4]\n\
                  [[curve]]\nname = \"onset\"\nhold = \"hopf\"\nof = \"steady\"\nfree = \"A\"\nuntil = 1.25\n\
@@ -264,7 +285,7 @@ fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
 
 #[test]
 fn attractors_are_listed_with_their_hits() {
-    let desk = desk("README.md");
+    let desk = desk();
     let rest = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16"], 0);
     assert!(rest.contains("equilibrium") && rest.contains("16 samples"), "{rest}");
     let cycle = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
@@ -279,7 +300,7 @@ fn attractors_are_listed_with_their_hits() {
 
 #[test]
 fn a_reader_that_closes_early_is_no_error() {
-    let desk = desk("README.md");
+    let desk = desk();
     printed(desk.path(), &["run", "study.toml"], 0);
     let mut child = Command::new(env!("CARGO_BIN_EXE_foldline"))
         .args(["table", "runs/study", "--points", "--format", "json"])
@@ -296,7 +317,7 @@ fn a_reader_that_closes_early_is_no_error() {
 
 #[test]
 fn unknown_names_in_a_run_are_refused() {
-    let desk = desk("README.md");
+    let desk = desk();
     printed(desk.path(), &["run", "study.toml"], 0);
     let refused = |arguments: &[&str], pieces: &[&str]| {
         let output = foldline(desk.path(), arguments);

@@ -13,3 +13,11 @@ fn every_file_is_part_of_this_program() {
         assert!(include_str!("main.rs").contains(&format!("\nmod {name};\n")), "tests/{name}.rs is not run");
     }
 }
+
+/// The copy is what a published package contains, which cannot reach files outside its folder.
+#[test]
+fn the_model_is_a_copy_of_that_among_the_models() {
+    let [own, common] =
+        [include_str!("../models/overhung-rotor.toml"), include_str!("../../../models/overhung-rotor.toml")];
+    assert!(own == common, "copy models/overhung-rotor.toml to crates/foldline-reproduce/models");
+}

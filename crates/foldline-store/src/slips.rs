@@ -3,6 +3,7 @@
 //! **Idea.** The parser says which symbol it expected. Whoever writes a first model needs the line as it should be, which
 //! follows from the line as it is: a value without quotes, a decimal comma, a comment of another language.
 
+use foldline::model::constant_value;
 use std::ops::Range;
 
 /// Message in place of that of the parser, if that one says little, and the correction.
@@ -141,7 +142,17 @@ fn assignment(line: &str) -> Option<Slip> {
     if let Some(number) = number(value) {
         return cured(format!("write `{key} = {number}`"));
     }
-    // Lists, tables and text in quotes have mistakes of other kinds.
+    if let Some(number) = computed(value) {
+        return told(format!("the value of `{key}` is a formula"), format!("write its value: `{key} = {number}`"));
+    }
+    if let Some(list) = value.strip_prefix('[').and_then(|list| list.strip_suffix(']')) {
+        let entries: Option<Vec<String>> = list.split(',').map(computed).collect();
+        if let Some(entries) = entries {
+            let cure = format!("write their values: `{key} = [{}]`", entries.join(", "));
+            return told(format!("an entry of `{key}` is not written as a number of TOML"), cure);
+        }
+    }
+    // Other lists, tables and text in quotes have mistakes of other kinds.
     let plain = !value.starts_with(['[', '{', '"', '\'']) && !value.contains('"');
     plain.then(|| Slip {
         message: Some(format!("the value of `{key}` is text without quotes")),
@@ -158,6 +169,11 @@ fn uncommented(value: &str) -> Option<&str> {
 fn quoted_if_text(value: &str) -> String {
     let is_value = value.starts_with(['[', '{', '"', '\'']) || value.parse::<f64>().is_ok() || value == "…";
     if is_value { value.to_string() } else { format!("\"{value}\"") }
+}
+
+/// The value of a formula without names, such as `1/2` or `2*pi`, as TOML writes it.
+fn computed(formula: &str) -> Option<String> {
+    constant_value(formula, &[]).ok().filter(|number| number.is_finite()).map(|number| format!("{number:?}"))
 }
 
 /// A number in a notation that TOML lacks, as TOML writes it: `0,5`, `.5`, `5.`, `1d-3`.
@@ -201,7 +217,9 @@ mod tests {
             ("mu = 5.", "mu = 5.0"),
             ("mu = 1d-3 # as Fortran", "mu = 1e-3"),
             ("mu = 0.5;", "mu = 0.5"),
-            ("mu = 1/2", "mu = \"1/2\""),
+            ("mu = 1/2", "mu = 0.5"),
+            ("mu = a/2", "mu = \"a/2\""),
+            ("range = [-1, 1/2]", "range = [-1.0, 0.5]"),
             ("mu = 0.5 mm", "mu = \"0.5 mm\""),
             ("mu: 0.5", "mu = 0.5"),
             ("mu: x*y", "mu = \"x*y\""),

@@ -236,6 +236,13 @@ fn accelerations_declare_a_state_and_its_velocity() {
     assert_eq!((place, message.as_str()), ((2, 7), "unknown name `x'`"));
     assert!(hint.contains("`\"x''\" = \"…\"` under [states]"), "{hint}");
     assert!(mistake("[states]\n\"x'\" = \"1\"\n").2.contains("`\"x''\" = \"…\"` declares `x` and `x'`"));
+    // A higher derivative has no notation of its own: the first-order form is spelled out, and is a model.
+    let form = "`u = \"u1\"`, `u1 = \"u2\"`, `u2 = \"u3\"` and `u3 = \"…\"` under [states]";
+    for text in ["\"u''''\" = \"-u\"", "u = \"u'''' = -u\"", "u = \"-u''''\""] {
+        let (_, message, hint) = mistake(&format!("[states]\n{text}\n"));
+        assert!(hint.contains(form), "{text}: {message}: {hint}");
+    }
+    assert_eq!(names(&model("[states]\nu = 'u1'\nu1 = 'u2'\nu2 = 'u3'\nu3 = '-u'\n")), ["u", "u1", "u2", "u3"]);
 }
 
 #[test]

@@ -1,20 +1,28 @@
 //! Links, anchors and paths in Markdown files.
 
+use crate::release::address;
 use crate::root;
 use crate::tree::Text;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Returns a message for each relative link whose file or anchor does not exist, and for each mentioned path of this
+/// Returns a message for each link into this repository, relative or by its address, whose file or anchor does not exist, and for each mentioned path of this
 /// repository that does not exist.
 pub fn broken(texts: &[Text]) -> Vec<String> {
     let pages: Vec<&Text> = texts.iter().filter(|text| text.is(&["md"])).collect();
+    let own = ["blob", "raw"].map(|kind| format!("{}/{kind}/main/", address()));
     let anchors: HashMap<&str, HashSet<String>> =
         pages.iter().map(|page| (page.name.as_str(), anchors(&page.text))).collect();
     let mut found = Vec::new();
     for page in &pages {
         for (offset, target) in targets(&page.text) {
-            if let Some(reason) = fault(&page.name, target, &anchors) {
+            // A page that is shown elsewhere links to files of this repository by its address.
+            let file = own.iter().find_map(|start| target.strip_prefix(start));
+            let fault = match file {
+                Some(file) => fault("", file, &anchors),
+                None => fault(&page.name, target, &anchors),
+            };
+            if let Some(reason) = fault {
                 found.push(format!("{}: link to {target}: {reason}", page.place(offset)));
             }
         }
@@ -104,6 +112,10 @@ fn targets(text: &str) -> Vec<(usize, &str)> {
             let target = line[at + 2..].split([')', ' ']).next().unwrap_or_default();
             found.push((offset + at, target));
         }
+        // An image with a width.
+        for (at, start) in line.match_indices("<img src=\"").filter(|(at, _)| !code(*at)) {
+            found.push((offset + at, line[at + start.len()..].split('"').next().unwrap_or_default()));
+        }
         if let Some((_, target)) = line.strip_prefix('[').and_then(|line| line.split_once("]: ")) {
             found.push((offset, target.trim()));
         }
@@ -172,9 +184,10 @@ mod tests {
 
     #[test]
     fn links_are_found_outside_code_only() {
-        let text = "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n```text\n[h](i)\n```\n";
+        let text =
+            "[a](b.md#c) `[x](y)` ![d](e.png)\n[f]: g.md\n<img src=\"j.png\" width=\"640\">\n```text\n[h](i)\n```\n";
         let found: Vec<&str> = targets(text).into_iter().map(|(_, target)| target).collect();
-        assert_eq!(found, ["b.md#c", "e.png", "g.md"]);
+        assert_eq!(found, ["b.md#c", "e.png", "g.md", "j.png"]);
     }
 
     #[test]
@@ -184,6 +197,9 @@ mod tests {
         assert_eq!(found("# Here\n[a](../README.md) [b](#here) [c](https://x.y)\ndocs/book/cli.md\n"), [""; 0]);
         assert_eq!(found("\n[a](no.md)\n"), ["docs/x.md:2: link to no.md: there is no such file"]);
         assert_eq!(found("[a](#no)\n"), ["docs/x.md:1: link to #no: the page has no such heading"]);
+        let by_address = |path: &str| format!("[a]({}/blob/main/{path})\n", address());
+        assert_eq!(found(&by_address("docs/book/cli.md")), [""; 0]);
+        assert_eq!(found(&by_address("docs/book/no.md")).len(), 1);
         assert_eq!(found("in docs/no.md.\n"), ["docs/x.md:1: docs/no.md does not exist"]);
         assert_eq!(found("in docs/decisions/0001\n"), [""; 0]);
     }

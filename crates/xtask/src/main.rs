@@ -28,6 +28,8 @@ const USAGE: &str = "cargo xtask TASK
   python      the wheel of the Python package, its formatter, type checker and tests in an environment under target; where there is no
               Python that is said
   deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
+  licences    licences of everything that the command and the wheel contain, in target/THIRD-PARTY.html and
+              python/foldline/THIRD-PARTY.html, by cargo-about, which is installed under target if it is not there
   bench       time, instructions, memory and work, written to benches/results/DATE.md; with --peers beside AUTO-07p and SciPy
               too; --only PART and --quick for a look (docs/book/benchmarks.md)
   reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
         "page" => page::test(),
         "python" => python::test(),
         "deny" => deny(),
+        "licences" => licences(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),
@@ -115,20 +118,37 @@ fn words(all: bool) -> bool {
     spelling::right() && faults.is_empty()
 }
 
-/// The program cargo-deny, which is installed under target if it is not there. It is built without optimisation, which
-/// takes a third of the time.
-fn cargo_deny() -> Option<PathBuf> {
-    /// Newest version that was tested.
-    const VERSION: &str = "0.20.2";
+/// A program of cargo, which is installed under target, with these further arguments, if it is not there.
+fn tool(name: &str, version: &str, further: &[&str]) -> Option<PathBuf> {
     let tools = root().join("target/tools");
-    let own = tools.join("bin/cargo-deny");
-    let known = Command::new("cargo-deny").arg("--version").output().is_ok_and(|output| output.status.success());
+    let own = tools.join("bin").join(name);
+    let known = Command::new(name).arg("--version").output().is_ok_and(|output| output.status.success());
     if known {
-        return Some(PathBuf::from("cargo-deny"));
+        return Some(PathBuf::from(name));
     }
-    let install = ["install", "cargo-deny", "--version", VERSION, "--locked", "--debug", "--quiet", "--root"];
-    let there = own.exists() || run(Command::new(cargo_path()).args(install).arg(&tools));
+    let install = ["install", name, "--version", version, "--locked", "--quiet", "--root"];
+    // `cargo install` succeeds without a program if a feature is missing.
+    let there = own.exists() || run(Command::new(cargo_path()).args(install).arg(&tools).args(further)) && own.exists();
     there.then_some(own)
+}
+
+/// The program cargo-deny, in the newest version that was tested. It is built without optimisation, which takes a third
+/// of the time.
+fn cargo_deny() -> Option<PathBuf> {
+    tool("cargo-deny", "0.20.2", &["--debug"])
+}
+
+/// Writes the licences of what the command and the wheel contain, each as a page.
+fn licences() -> bool {
+    let Some(program) = tool("cargo-about", "0.9.3", &["--features", "cli"]) else { return false };
+    [("foldline-cli", "target/THIRD-PARTY.html"), ("foldline-py", "python/foldline/THIRD-PARTY.html")].iter().all(
+        |(part, page)| {
+            let manifest = format!("crates/{part}/Cargo.toml");
+            let arguments = ["generate", "about.hbs", "--manifest-path", &manifest, "--output-file", page];
+            eprintln!("cargo about {}", arguments.join(" "));
+            run(Command::new(&program).args(arguments))
+        },
+    )
 }
 
 /// Checks dependencies with cargo-deny.

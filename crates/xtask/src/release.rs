@@ -12,10 +12,18 @@ const KEY: &str = "Repository = ";
 const PLACEHOLDER: &str = "https://example.org/foldline";
 
 /// Files that state the address.
-const WITH_ADDRESS: [&str; 5] =
-    ["CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "SECURITY.md", ".github/ISSUE_TEMPLATE/config.yml"];
+const WITH_ADDRESS: [&str; 7] = [
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "CODE_OF_CONDUCT.md",
+    "SECURITY.md",
+    ".github/ISSUE_TEMPLATE/config.yml",
+    "Cargo.toml",
+    "python/README.md",
+];
 
-fn address() -> String {
+/// Address of the repository.
+pub fn address() -> String {
     let text = std::fs::read_to_string(root().join(ADDRESS)).unwrap_or_default();
     text.lines().find_map(|line| line.strip_prefix(KEY)).map_or("", |value| value.trim_matches('"')).to_string()
 }

@@ -35,7 +35,7 @@ pub fn texts() -> Vec<Text> {
     found
 }
 
-const EXTENSIONS: [&str; 7] = ["md", "rs", "py", "toml", "yml", "cff", "ipynb"];
+const EXTENSIONS: [&str; 8] = ["md", "rs", "py", "toml", "yml", "yaml", "cff", "ipynb"];
 
 fn collect(folder: &Path, prefix: &str, found: &mut Vec<Text>) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {

@@ -5,7 +5,7 @@ use crate::workplace::Workplace;
 use crate::{Outcome, child, clock, rotor};
 
 /// Study with eighteen branches, including curves in two parameters.
-const FLOWS: &str = "studies/akay2022/flows.toml";
+const FLOWS: &str = "crates/foldline-reproduce/studies/akay2022/flows.toml";
 
 /// Measures two studies with one and with two jobs.
 pub fn two(place: &Workplace) -> Outcome<String> {

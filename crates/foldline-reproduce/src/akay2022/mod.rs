@@ -22,7 +22,7 @@ mod simulation;
 
 use crate::publication::{FigurePlan, Publication, StudyPlan};
 
-const MODEL: &str = include_str!("../../../../models/overhung-rotor.toml");
+const MODEL: &str = include_str!("../../models/overhung-rotor.toml");
 
 /// Defines a study of this publication by its name, file and weight.
 macro_rules! study {
@@ -30,7 +30,7 @@ macro_rules! study {
         StudyPlan {
             name: $name,
             file: concat!("akay2022/", $name, ".toml"),
-            text: include_str!(concat!("../../../../studies/akay2022/", $name, ".toml")),
+            text: include_str!(concat!("../../studies/akay2022/", $name, ".toml")),
             model_file: "overhung-rotor.toml",
             model: MODEL,
             weight: $weight,

@@ -2,7 +2,7 @@
 
 use super::Reader;
 use crate::toml_walk::Value;
-use foldline::model::{Definition, Ends, Field, Item, ModelSource, State, constant_value};
+use foldline::model::{Definition, Ends, Field, Item, ModelSource, State, constant_value, first_order_form};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
@@ -16,7 +16,10 @@ impl Reader<'_> {
         if base.ends_with('\'') {
             let own = base.trim_end_matches('\'');
             self.incomplete = true;
-            let hint = format!("give the acceleration: `\"{own}''\" = \"…\"` declares `{own}` and `{own}'`");
+            let hint = match name.len() - own.len() {
+                order if order > 2 => first_order_form(own, order),
+                _ => format!("give the acceleration: `\"{own}''\" = \"…\"` declares `{own}` and `{own}'`"),
+            };
             return self.walk.report(place, format!("`{name}` is not the name of a state"), hint);
         }
         let second = base.len() < name.len() || self.accelerated.contains(base);

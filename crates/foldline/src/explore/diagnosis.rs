@@ -197,7 +197,7 @@ pub(super) fn place(system: &System, state: &[f64]) -> String {
     const TOLD: usize = 6;
     let state = in_first_turn(system.field.periods(), state);
     let named = system.state_names.iter().zip(&state).take(TOLD);
-    let told: Vec<String> = named.map(|(name, value)| format!("{name} = {value:.6}")).collect();
+    let told: Vec<String> = named.map(|(name, value)| format!("{name} = {:.6}", Shown(*value))).collect();
     let more = if state.len() > TOLD { ", …" } else { "" };
     format!("{}{more}", told.join(", "))
 }

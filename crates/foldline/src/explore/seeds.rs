@@ -22,7 +22,7 @@ use crate::attractors::{self, Attractor, Candidate, Census, Fate, Limits, Lost, 
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer, Unobserved, Verdict};
-use crate::diagram::{Cost, Cycle, Diagram, Point, Response, Solution};
+use crate::diagram::{Cost, Cycle, Diagram, Point, Response, Shown, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::problem::stiffness;
@@ -551,8 +551,9 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
             )
         }
         Lost::Unconfirmed { period, state } if *period > 0.0 => format!(
-            "settles to a cycle of period {period:.6} through {}, which Newton's method does not confirm as isolated \
+            "settles to a cycle of period {:.6} through {}, which Newton's method does not confirm as isolated \
              and stable",
+            Shown(*period),
             place(system, state)
         ),
         Lost::Unconfirmed { state, .. } => format!(

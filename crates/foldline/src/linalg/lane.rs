@@ -53,6 +53,16 @@ pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output =
 impl Lane for f64 {
     const COUNT: usize = 1;
 
+    /// Compiled for vectors of four numbers at most: here those of eight save less than a twentieth of the time of a run,
+    /// and their copies of the kernels take a twentieth of the compilation of this crate.
+    fn dispatch<R>(work: impl pulp::NullaryFnOnce<Output = R>) -> R {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(simd) = pulp::x86::V3::try_new() {
+            return simd.vectorize(work);
+        }
+        work.call()
+    }
+
     fn multiply(c: (&mut [f64], usize), a: (&[f64], usize), b: (&[f64], usize), sizes: [usize; 3]) {
         super::dense::multiply(c, a, b, sizes);
     }

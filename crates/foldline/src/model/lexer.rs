@@ -62,16 +62,54 @@ pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint>
         } else {
             return Err(match (first, words.last()) {
                 ('.', Some((Token::Name(of), span))) => part(of, &rest[1..], span.start),
-                ('=', Some((Token::Name(of), span))) if of.ends_with("''") => Complaint::new(
-                    span.start..at + 1,
-                    "an equation has only its right-hand side here",
-                    format!("give the acceleration as a state: `\"{of}\" = \"…\"` under [states]"),
-                ),
+                ('=', _) if left_side(&text[..at]).is_some() => equation(&text[..at]),
                 _ => stray(first, at),
             });
         }
     }
     Ok(words)
+}
+
+/// The name whose rate stands on the left of an equation: the `x` of `x'`, `x''` or `dx/dt`, or of `x` alone, with the
+/// order of the derivative.
+fn left_side(text: &str) -> Option<(&str, usize)> {
+    let text = text.trim();
+    let rate = text.strip_suffix("/dt").and_then(|text| text.strip_prefix('d'));
+    let base = rate.unwrap_or(text).trim_end_matches('\'');
+    let order = if rate.is_some() { 1 } else { text.len() - base.len() };
+    let named = base.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    (named && base.chars().all(|c| c.is_alphanumeric() || c == '_')).then_some((base, order))
+}
+
+/// Complaint about an equation with its left-hand side, `left`, where only the right-hand side belongs.
+fn equation(left: &str) -> Complaint {
+    let hint = match left_side(left) {
+        Some((base, 2)) => format!("give the acceleration as a state: `\"{base}''\" = \"…\"` under [states]"),
+        Some((base, order)) if order > 2 => first_order_form(base, order),
+        _ => format!("remove `{} =`", left.trim()),
+    };
+    Complaint::new(
+        left.len() - left.trim_start().len()..left.len() + 1,
+        "an equation has only its right-hand side here",
+        hint,
+    )
+}
+
+/// Says how an equation for a derivative of order above two is written, with a state for each lower derivative.
+///
+/// ```
+/// let said = foldline::model::first_order_form("x", 3);
+/// assert!(said.contains("`x = \"x1\"`, `x1 = \"x2\"` and `x2 = \"…\"`"));
+/// ```
+pub fn first_order_form(base: &str, order: usize) -> String {
+    let names: Vec<String> =
+        std::iter::once(base.to_string()).chain((1..order).map(|k| format!("{base}{k}"))).collect();
+    let steps: Vec<String> = names.windows(2).map(|pair| format!("`{} = \"{}\"`", pair[0], pair[1])).collect();
+    let last = names.last().map_or(base, String::as_str);
+    format!(
+        "write it in first-order form, with a state for each derivative: {} and `{last} = \"…\"` under [states]",
+        steps.join(", ")
+    )
 }
 
 /// Value and length of the number at the start of `rest`.

@@ -55,6 +55,7 @@ pub use dimensions::{TAKEN_AS, UnitReport, check_units};
 pub use error::{Field, Item, ModelError};
 pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
+pub use lexer::first_order_form;
 pub use nearest::{nearest, suggest};
 pub use source::{
     Boundary, Constant, Contact, Definition, Ends, Event, Forcing, Function, Mass, ModelSource, Output, Parameter,

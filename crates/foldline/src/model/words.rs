@@ -96,6 +96,10 @@ impl Check<'_> {
                 "`@0` and `@1` belong to boundary-value problems: give [interval] with its `length`, and [boundary]"
                     .into()
             }
+            None if name.ends_with("'''") => {
+                let base = name.trim_end_matches('\'');
+                super::lexer::first_order_form(base, name.len() - base.len())
+            }
             None if name.ends_with("''") => {
                 "an acceleration cannot be used in an expression; name its right-hand side in the definitions".into()
             }
