@@ -826,7 +826,9 @@ impl Growth<'_> {
                     let left = revived(walk.problem, self.settings, &there, direction).ok();
                     let found = left
                         .and_then(|left| corner::beyond(walk.problem, self.settings, system.field, &left, direction));
-                    let Some((special, right)) = found else { break };
+                    let Some((mut special, right)) = found else { break };
+                    // That of the lower of its neighbours.
+                    special.point.position = there.position - i64::from(side == 0);
                     stops = sink(Item::Special(special)) == Verdict::Stop;
                     right
                 }

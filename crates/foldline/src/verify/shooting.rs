@@ -101,11 +101,13 @@ impl Orbit {
         if count == 0 || cycle.dim() != n {
             return Err("its profile was not stored");
         }
-        let middle = |j: usize| 0.5 * (cycle.mesh[j] + cycle.mesh[j + 1]);
+        // States at the nodes of the mesh are more accurate than between them: errors there would move the solution along its
+        // branch.
+        let node = |j: usize| cycle.mesh[j];
         let unit = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
         let values: Vec<Vec<f64>> = (0..count)
             .map(|j| {
-                let (mut h, x, times) = (vec![0.0; field.switch_count()], cycle.state(middle(j)), [unit * middle(j)]);
+                let (mut h, x, times) = (vec![0.0; field.switch_count()], cycle.state(node(j)), [unit * node(j)]);
                 let times = if cycle.forcing_periods > 0 { &times[..] } else { &[] };
                 let parameters = Parameters::Shared(&point.parameters);
                 field.switches(Batch { lanes: 1, states: &x, parameters, times, signs: &[] }, &mut h);
@@ -120,7 +122,7 @@ impl Orbit {
             return Err("no part of the cycle is away from all surfaces");
         }
         let segments = SEGMENTS.min(safe.len());
-        let places: Vec<f64> = (0..segments).map(|i| middle(safe[i * safe.len() / segments])).collect();
+        let places: Vec<f64> = (0..segments).map(|i| node(safe[i * safe.len() / segments])).collect();
         let ends = places[1..].iter().copied().chain([places[0] + 1.0]);
         let shares = ends.zip(&places).map(|(end, begin)| end - begin).collect();
         Ok(Orbit {
