@@ -184,8 +184,9 @@ fn the_last_step_lands_on_the_bound() {
     assert!(values.is_sorted() && count > 8, "{values:?}");
     for point in [&branch.points[0], &branch.points[count - 1]] {
         assert!((point.ranges[0][1] - point.parameters[0].sqrt()).abs() < 1e-7);
-        // A step that is shortened to a bound only after acceptance is solved again there: twice the work of a step.
-        assert!(point.cost.newton <= 6 && point.cost.rejected == 0, "{:?}", point.cost);
+        // A step that is shortened to a bound only after acceptance is solved again there: twice the work of a step, five and
+        // three between its ends, since it is long.
+        assert!(point.cost.newton <= 9 && point.cost.rejected == 0, "{:?}", point.cost);
     }
 }
 
