@@ -128,7 +128,7 @@ fn grazings_of_the_spring_are_continued() {
     assert!((start.parameters[0] - TOUCHES_SPRING).abs() < 1e-8, "{:?}", start.parameters);
 }
 
-/// Multipliers of an oscillator with springs beyond two gaps, compared at the same frequencies with a computation at a thousandth
+/// Multipliers of an oscillator with springs beyond two gaps, compared at the same frequencies with a computation at a hundredth
 /// of the tolerance. Close to grazings they change so steeply that the error of the frequency at which a cycle exists decides.
 #[test]
 fn errors_of_multipliers_hold_at_the_same_value_of_the_parameter() {
@@ -146,22 +146,23 @@ fn errors_of_multipliers_hold_at_the_same_value_of_the_parameter() {
     let coarse = coarse.branch("b").unwrap();
     let some: Vec<&Point> = coarse.points.iter().step_by(2).filter(|point| point.trust.spectrum.is_finite()).collect();
     let values: Vec<String> = some.iter().map(|point| format!("{:e}", point.parameters[0])).collect();
-    let fine = of(&study("1e-9", &format!("mark = {{ om = [{}] }}\n", values.join(", "))));
+    let fine = of(&study("1e-8", &format!("mark = {{ om = [{}] }}\n", values.join(", "))));
     let marks: Vec<&Point> =
         fine.branch("b").unwrap().special.iter().filter(|s| s.kind == Kind::Mark).map(|s| &s.point).collect();
     let mut compared = 0;
     for own in &some {
+        // The branch is folded, so that several cycles have the same frequency.
         let near = |other: &&&Point| {
-            (other.parameters[0] - own.parameters[0]).abs() < 1e-14
-                && (other.ranges[0][1] - own.ranges[0][1]).abs() < 1e-4
+            let apart = own.ranges.iter().zip(&other.ranges).flat_map(|(a, b)| [a[0] - b[0], a[1] - b[1]]);
+            (other.parameters[0] - own.parameters[0]).abs() < 1e-14 && apart.map(f64::abs).fold(0.0, f64::max) < 1e-5
         };
         for other in marks.iter().filter(near) {
             let apart = |z: &Complex64| other.spectrum.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
             let off = own.spectrum.iter().map(|z| apart(z) / z.norm().max(1.0)).fold(0.0, f64::max);
-            let stated = own.trust.spectrum + 1e-10;
+            let stated = own.trust.spectrum + other.trust.spectrum.max(1e-10);
             assert!(off <= stated, "om = {}: {off:e}, stated {stated:e}", own.parameters[0]);
             compared += 1;
         }
     }
-    assert!(compared > 50, "{compared}");
+    assert!(compared > 50, "{compared} of {} and {}", some.len(), marks.len());
 }

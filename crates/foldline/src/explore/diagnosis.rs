@@ -196,8 +196,11 @@ pub(super) fn place(system: &System, state: &[f64]) -> String {
     /// Components that fit on one line.
     const TOLD: usize = 6;
     let state = in_first_turn(system.field.periods(), state);
-    let named = system.state_names.iter().zip(&state).take(TOLD);
-    let told: Vec<String> = named.map(|(name, value)| format!("{name} = {:.6}", Shown(*value))).collect();
+    /// Share of the scale below which a value is 0 up to rounding.
+    const NOTHING: f64 = 1e-12;
+    let named = system.state_names.iter().zip(state.iter().zip(&system.scales)).take(TOLD);
+    let rounded = |value: f64, scale: f64| Shown(if value.abs() < NOTHING * scale { 0.0 } else { value });
+    let told: Vec<String> = named.map(|(name, (x, scale))| format!("{name} = {:.6}", rounded(*x, *scale))).collect();
     let more = if state.len() > TOLD { ", …" } else { "" };
     format!("{}{more}", told.join(", "))
 }

@@ -320,7 +320,6 @@ impl<'a> Located<'a> {
         let begin = self.switches(&state[..n], span[0]);
         let mut astray = None;
         let mut met: Option<(Met, f64, Vec<f64>)> = None;
-        let mut last: Option<(f64, Vec<f64>)> = None;
         let mut steps: Vec<Kept> = Vec::new();
         let arrival = integrator.trajectory(&start, span, &sections, &mut |passage| match passage {
             Passage::Crossing(crossing) => {
@@ -339,11 +338,6 @@ impl<'a> Located<'a> {
                 let share =
                     if met.is_some() && ends[1] > ends[0] { (end - ends[0]) / (ends[1] - ends[0]) } else { 1.0 };
                 steps.push(([ends[0], end], sampled(step, n, share)));
-                if met.is_some() {
-                    let mut x = vec![0.0; start.len()];
-                    step.start_into(&mut x);
-                    last = Some((ends[0], x));
-                }
                 let mut x = vec![0.0; n];
                 step.end_into(&mut x);
                 if met.is_none() && self.astray(&x, ends[1], signs, &begin) {
@@ -359,50 +353,11 @@ impl<'a> Located<'a> {
             return Err(None);
         }
         let (met, mut arrived) = match met {
-            Some((met, time, state)) => {
-                // The interpolant of a step is less accurate than its end.
-                let again = last.and_then(|(begin, x)| {
-                    let arrival = integrator.trajectory(&x, [begin, time], &[], &mut |_| Verdict::Continue);
-                    (arrival.outcome == Outcome::Reached).then_some(arrival.state)
-                });
-                let (time, state) = self.onto(met, (time, again.unwrap_or(state)), &field, &parameters);
-                if let Some((ends, _)) = steps.last_mut() {
-                    ends[1] = time;
-                }
-                (Some(met), state)
-            }
+            Some((met, _, state)) => (Some(met), state),
             None => (None, arrival.state),
         };
         arrived.truncate(state.len());
         if max_abs(&arrived).is_finite() { Ok((Leg { flight, steps }, met, arrived)) } else { Err(None) }
-    }
-
-    /// A time and a state with its derivatives beside a surface, moved onto it along the flow.
-    fn onto(
-        &self,
-        met: Met,
-        (time, mut state): (f64, Vec<f64>),
-        field: &dyn VectorField,
-        parameters: &[f64],
-    ) -> (f64, Vec<f64>) {
-        /// Largest change of time, relative to that in which the value changes by its terms: the accuracy of an interpolant.
-        const NEAR: f64 = 1e-6;
-        let Met::Surface(switch) = met else { return (time, state) };
-        let n = self.field().dim();
-        let times = [time];
-        let [h, gradient, _, later] = self.setting.linearise_switches(self.batch(&state[..n], &times, &[]));
-        let gradient = &gradient[switch * n..(switch + 1) * n];
-        let mut rates = vec![0.0; state.len()];
-        let at = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
-        field.evaluate(at, &mut rates);
-        let speed = dot(gradient, &rates[..n]) + later[switch];
-        let delay = -h[switch] / speed;
-        let size: f64 = gradient.iter().zip(&state).map(|(g, x)| (g * x).abs()).sum::<f64>() + later[switch].abs();
-        if delay.is_nan() || delay.abs() > NEAR * size / speed.abs() {
-            return (time, state);
-        }
-        state.iter_mut().zip(&rates).for_each(|(x, rate)| *x += delay * rate);
-        (time + delay, state)
     }
 
     /// True if a surface is not to be met at a time.
