@@ -25,7 +25,6 @@
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Cycle, Point, Solution};
-use crate::problem::gauss::Scheme;
 use crate::special::sliding;
 use foldline_general::{Mat, complex_solution};
 use num_complex::Complex64;
@@ -168,7 +167,7 @@ fn response(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, forcing:
         }
     }
     let starts = complex_solution(left.as_ref(), &right);
-    let (scheme, mut largest) = (cycle.scheme(), vec![0.0_f64; n]);
+    let mut largest = vec![0.0_f64; n];
     for (g, group) in steps.chunks(length).enumerate() {
         let mut p: Vec<Complex64> = (0..n).map(|i| starts[(g * n + i, 0)]).collect();
         for own in group {
@@ -178,7 +177,7 @@ fn response(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, forcing:
             let inside: Vec<Complex64> = (0..own.inside.nrows()).map(|row| value(&own.inside, row)).collect();
             for (i, largest) in largest.iter_mut().enumerate() {
                 let nodes = std::iter::once(p[i]).chain(inside.iter().skip(i).step_by(n).copied());
-                let size = highest(scheme, &nodes.collect::<Vec<_>>());
+                let size = highest(cycle, &nodes.collect::<Vec<_>>());
                 // NaN must not be lost.
                 *largest = if size > *largest || size.is_nan() { size } else { *largest };
             }
@@ -190,11 +189,11 @@ fn response(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, forcing:
 
 /// Largest modulus of a polynomial on an interval, from its values at the nodes: of its samples, and of the parabola through the
 /// largest one and its neighbours.
-fn highest(scheme: &Scheme, nodes: &[Complex64]) -> f64 {
+fn highest(cycle: &Cycle, nodes: &[Complex64]) -> f64 {
     /// With eight sections the parabola is accurate to 1e-5 of the rise of |p| over the interval.
     const SECTIONS: usize = 8;
     let at = |k: usize| {
-        let weights = scheme.interpolation(k as f64 / SECTIONS as f64);
+        let weights = cycle.scheme().interpolation(k as f64 / SECTIONS as f64);
         weights.iter().zip(nodes).map(|(w, p)| p * *w).sum::<Complex64>().norm()
     };
     let sizes: Vec<f64> = (0..=SECTIONS).map(at).collect();
