@@ -10,6 +10,7 @@ use crate::explore::plan::Plan;
 use crate::explore::{System, axis_of, growth};
 use crate::problem::held::Held;
 use crate::problem::{Axis, Setting};
+use crate::special::sliding::meets_jump;
 use std::f64::consts::TAU;
 
 /// Index of a parameter that affects nothing.
@@ -150,9 +151,13 @@ impl<'a> Posed<'a> {
         }
         let best = others.last().unwrap_or(&first);
         let lasts = self.lasting(base, best);
+        let jumps = self.kind == Some(Kind::Fold) && self.jumps(base)?;
         let rows = best.values.iter().enumerate().map(|(r, &(of, value))| {
             let by = (0..self.parameters.len()).map(|i| {
                 lasts[i].clone()?;
+                if jumps && matches!(of, Measured::Smallest(_) | Measured::Largest(_)) {
+                    return Err("not known at a fold of cycles along which the right-hand side jumps".into());
+                }
                 let own = best.slopes[i][r].clone()?;
                 let mut apart: f64 = 0.0;
                 for route in others.iter().chain([&first]) {
@@ -172,6 +177,20 @@ impl<'a> Posed<'a> {
             Row { of, value, by: by.collect() }
         });
         Ok(Sensitivities { rows: rows.collect(), parameters: self.parameters.clone() })
+    }
+
+    /// True if the right-hand side jumps along a cycle: along the curve of folds, the second derivatives of the flow in the
+    /// direction of the null vector would then include the change of its saltation matrices.
+    fn jumps(&self, base: &Base) -> Result<bool, String> {
+        let mut problem = self.isolated(&base.parameters)?;
+        let problem = problem.zero();
+        problem.set_mesh(&base.mesh);
+        problem.anchor(&base.u);
+        let at = problem.point(&base.u, &vec![0.0; base.u.len()], Examination::default());
+        Ok(match &at.solution {
+            Solution::Cycle(cycle) => meets_jump(self.system.field, &at.parameters, cycle),
+            Solution::Equilibrium(_) | Solution::Torus(_) => false,
+        })
     }
 
     /// Characteristic size of a number, to which rounding errors are relative, given its value and its change with the
