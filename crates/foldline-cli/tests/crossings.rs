@@ -385,3 +385,19 @@ fn a_range_may_end_on_a_special_point() {
     assert_eq!(code, 0, "{text}");
     assert!(!text.contains("unexplained"), "{text}");
 }
+
+/// l1 vanishes at q = 0.3 and 0.5, between points of the curve at ..., 0.1, 0.3, 0.5, 0.7.
+#[test]
+fn generalised_hopf_points_on_points_of_their_curve_are_found() {
+    let model = "[parameters]\nl = -0.5\nq = -1\n[definitions]\nr2 = \"x^2 + y^2\"\nb = \"((q - 0.4)^2 - 0.01)/((q - 0.4)^2 + 0.01)\"\n\
+                 g = \"l + b*r2 - r2^2\"\n[states]\nx = { equation = \"g*x - 1.3*y\", range = [-2, 2] }\n\
+                 y = { equation = \"g*y + 1.3*x\", range = [-2, 2] }\n";
+    let study = format!(
+        "{}[[curve]]\nname = \"c\"\nof = \"b\"\nhold = \"hopf\"\nfree = \"q\"\nrange = [-1, 1]\n",
+        "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"l\"\nrange = [-0.5, 0.5]\n"
+    );
+    let (text, code) = run(model, &study, "1e-6");
+    assert_eq!(code, 0, "{text}");
+    let found: Vec<f64> = points(&text, "c", "generalised-hopf").iter().map(|line| value(line, 3)).collect();
+    assert!(found.len() == 2 && (found[0] - 0.3).abs() < 1e-9 && (found[1] - 0.5).abs() < 1e-9, "{text}");
+}

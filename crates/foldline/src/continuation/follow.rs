@@ -351,8 +351,9 @@ impl Follow<'_> {
         (tried, found)
     }
 
-    /// A longer step in place of `tried` if that ends at an equilibrium, or at a fixed point or cycle of a map, whose number of
-    /// unstable eigenvalues or multipliers rounding decides, as beside a branch point, and the longer one does not.
+    /// A longer step in place of `tried` if that ends at an equilibrium, or at a fixed point or cycle of a map, at which rounding
+    /// decides on the number of unstable eigenvalues or multipliers, as beside a branch point, or, along curves, on the sign of a
+    /// monitor, and the longer one does not.
     fn beyond_rounding(
         &mut self,
         left: &Station,
@@ -361,20 +362,31 @@ impl Follow<'_> {
         tried: Step,
         cost: &mut Cost,
     ) -> Step {
-        let counts = self.settings.stability && left.mesh.is_empty() && tried.end.is_none();
         // Along a family of equilibria rounding decides everywhere.
-        if !counts || !self.is_undecided(&tried.right) || self.is_undecided(left) {
+        let apart =
+            left.mesh.is_empty() && tried.end.is_none() && !(self.settings.stability && self.is_undecided(left));
+        if !apart || !self.is_on_border(left, &tried.right) {
             return tried;
         }
         // As little longer as possible: a second special point may follow. No round numbers, as those at which it may lie.
         for longer in [1.057, 1.31, 2.07, 4.13, 8.3, 16.7] {
             match self.attempt(left, trail, longer * step, rigid, cost) {
-                Ok(beyond) if !self.is_undecided(&beyond.right) => return beyond,
+                Ok(beyond) if !self.is_on_border(left, &beyond.right) => return beyond,
                 Ok(_) => {}
                 Err(_) => break,
             }
         }
         tried
+    }
+
+    /// True if rounding decides what is on which side of a station at the end of a step from `left`.
+    fn is_on_border(&mut self, left: &Station, right: &Station) -> bool {
+        /// Value of a monitor, relative to that at the other end, below which it is rounding.
+        const ROUNDING: f64 = 1e-10;
+        if self.settings.stability {
+            return self.is_undecided(right);
+        }
+        self.monitored(left).iter().zip(self.monitored(right)).any(|(a, b)| b.abs() <= ROUNDING * a.abs() && *a != 0.0)
     }
 
     /// A step on a moving mesh within which there is no special point and stability does not change.
