@@ -713,6 +713,11 @@ impl Growth<'_> {
         let grazed: RefCell<Option<(Vec<f64>, usize)>> = RefCell::new(None);
         let doubled = is_doubled(branch);
         let trespassed: RefCell<Option<String>> = RefCell::new(None);
+        let trespasses = |point: &Point| {
+            let error = (point.trust.discretisation + point.trust.residual).max(TRESPASS[1]);
+            trespassed.replace(impact::trespass([TRESPASS[0] * error; 2], system.field, point));
+            trespassed.borrow().is_some()
+        };
         let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
@@ -725,6 +730,10 @@ impl Growth<'_> {
                         && beside_impacts::grazes(system.field, &special.point)
                     {
                         return Verdict::Continue;
+                    }
+                    // A touch that is none, since the errors of its cycle are larger than what decides.
+                    if special.kind == Kind::ImpactGrazing && branch.held.is_none() && trespasses(&special.point) {
+                        return Verdict::Stop;
                     }
                     if special.kind == Kind::NonCentral {
                         // Its position depends on where the orbit is cut. The terms that its test function neglects are below the tolerance.
@@ -766,12 +775,8 @@ impl Growth<'_> {
                     }
                     latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
-                    if system.field.event_count() > 0 && branch.held.is_none() {
-                        let error = (point.trust.discretisation + point.trust.residual).max(TRESPASS[1]);
-                        trespassed.replace(impact::trespass([TRESPASS[0] * error; 2], system.field, &point));
-                        if trespassed.borrow().is_some() {
-                            return Verdict::Stop;
-                        }
+                    if system.field.event_count() > 0 && branch.held.is_none() && trespasses(&point) {
+                        return Verdict::Stop;
                     }
                     let before = record.borrow_mut().point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
