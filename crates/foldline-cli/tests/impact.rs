@@ -413,3 +413,29 @@ fn branches_with_different_numbers_of_impacts_are_told_apart() {
     let own = run(model, study);
     assert!(own.branch("b/branch-point-1").is_some_and(|own| own.points.len() > 10));
 }
+
+/// x'' + c x' + x = A cos(w t) reaches the wall at 1 where A = |1 - w² + i c w|. Where its largest value follows soon after the
+/// beginning of a period, the motion is beyond the wall there at once.
+#[test]
+fn a_touch_soon_after_the_beginning_of_a_period_is_found() {
+    for c in [0.1, 0.15, 0.2] {
+        let response = |w: f64| 0.5 / (1.0 - w * w).hypot(c * w);
+        let (mut low, mut high) = (0.6f64, 0.95f64);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if response(middle) < 1.0 { low = middle } else { high = middle }
+        }
+        for tolerance in ["1e-5", "1e-6", "1e-8"] {
+            let study = format!(
+                "tolerance = {tolerance}\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nperiods = 1\nsamples = 4\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.5, 0.9]\n"
+            );
+            let diagram = run(&walled([1.0, c, 0.8, 0.0, 0.5, 1.0], 0.6), &study);
+            let own = diagram.branch("b").unwrap();
+            let found = own.special.iter().filter(|s| s.kind == Kind::ImpactGrazing).map(|s| s.point.parameters[0]);
+            let off = found.map(|w| (w - low).abs()).fold(f64::INFINITY, f64::min);
+            assert!(off < 1e-6, "c = {c}, {tolerance}: {off:e}");
+            assert!(own.points.iter().all(|point| point.ranges[0][1] < 1.0 + 1e-5), "c = {c}, {tolerance}");
+        }
+    }
+}

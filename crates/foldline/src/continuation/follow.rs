@@ -320,17 +320,21 @@ impl Follow<'_> {
         cost: &mut Cost,
         (mut tried, found): (Step, Vec<Found>),
     ) -> (Step, Vec<Found>) {
-        /// Least error that is assumed: the accuracy to which a point is located.
-        const LEAST: f64 = 1e-9;
+        /// Least and largest error that is assumed: the accuracy to which a point is located, and beyond which nothing is settled
+        /// by it.
+        const ERRORS: [f64; 2] = [1e-9, 1e-6];
         /// Largest distance from the border of the critical eigenvalue or multiplier of what is found.
         const FOUND: f64 = 1e-7;
+        // Eigenvalues are relative to the largest.
         let border = |point: &Point| -> Vec<f64> {
             let cycle = point.solution.period().is_some();
-            let off = |z: &Complex64| if cycle { (z.norm() - 1.0) / z.norm().max(1.0) } else { z.re };
+            let largest = point.free_spectrum().iter().map(|z| z.norm()).fold(f64::MIN_POSITIVE, f64::max);
+            let off = |z: &Complex64| if cycle { (z.norm() - 1.0) / z.norm().max(1.0) } else { z.re / largest };
             point.free_spectrum().iter().map(off).collect()
         };
         let point = &tried.right.point;
-        let error = if point.trust.spectrum > LEAST { point.trust.spectrum } else { LEAST };
+        let stated = if point.solution.period().is_some() { point.trust.spectrum } else { 0.0 };
+        let error = if stated > ERRORS[0] { stated.min(ERRORS[1]) } else { ERRORS[0] };
         let critical: Vec<f64> = border(point).into_iter().filter(|off| off.abs() <= error).collect();
         let counted = point.unstable;
         let fewest = counted.saturating_sub(critical.iter().filter(|off| **off > 0.0).count());

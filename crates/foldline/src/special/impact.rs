@@ -138,7 +138,21 @@ pub fn trespass(slack: [f64; 2], field: &dyn VectorField, at: &Point) -> Option<
     if speeds(field, &at.parameters, cycle).iter().any(|v| *v < least) {
         return Some("an event is passed in the wrong direction".into());
     }
-    (highest.value > slack[1] * highest.size).then(|| "it passes the surface of an event without it".into())
+    (highest.value > slack[1] * size_of_terms(field, at, cycle, &highest))
+        .then(|| "it passes the surface of an event without it".into())
+}
+
+/// Size of a switch or of its terms, to which errors of its value are relative.
+fn size_of_terms(field: &dyn VectorField, at: &Point, cycle: &Cycle, highest: &Highest) -> f64 {
+    let (n, switches) = (cycle.dim(), field.switch_count());
+    let (x, times) = (cycle.state(highest.time), times_of(cycle, highest.time));
+    let [mut h, mut hx, mut ht] = [1, n, 1].map(|size| vec![0.0; switches * size]);
+    let batch =
+        Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&at.parameters), times: &times, signs: &[] };
+    field.linearise_switches(batch, &[], [&mut h, &mut hx, &mut [], &mut ht]);
+    let surface = switches - field.event_count() + highest.event;
+    let terms: f64 = hx[surface * n..(surface + 1) * n].iter().zip(&x).map(|(g, x)| (g * x).abs()).sum();
+    highest.size.max(terms)
 }
 
 /// Speed of an oscillation of a size with the period of a cycle, in the time of the field.
@@ -264,11 +278,11 @@ fn highest_but(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, held:
 }
 
 /// Local maxima of samples that are not at an end. At an end that is `on` the surface, a minimum lies between it and the
-/// maximum. A stretch at the beginning that is positive does not count.
+/// maximum, and a stretch at the beginning that is positive does not count.
 fn maxima(values: &[f64], on: [bool; 2]) -> Vec<usize> {
     let last = values.len() - 1;
     let deep = -DEEP * values.iter().fold(0.0f64, |most, h| most.max(h.abs()));
-    let below = if values[1] > -deep { values.iter().position(|h| *h < 0.0).unwrap_or(last) } else { 0 };
+    let below = if on[0] && values[1] > -deep { values.iter().position(|h| *h < 0.0).unwrap_or(last) } else { 0 };
     let inner = |k: usize| values[k] > values[k - 1] && values[k] >= values[k + 1];
     let dips = |k: usize| values[k] < deep && values[k] <= values[k - 1] && values[k] < values[k + 1];
     let falls: Vec<usize> = (1..last).filter(|k| dips(*k)).collect();
