@@ -289,15 +289,3 @@ fn damping_limits_of_the_rotor_agree_with_an_independent_continuation() {
     let there = answered(&other, "near");
     assert!((there.value - end.parameters[ZETA]).abs() < 1e-6, "{} {:?}", there.value, end.parameters);
 }
-
-/// x' = -((x + 0.572 + 0.373 l)² + (l - 0.215 + 0.122 P)² - (0.197 - P)), P = p/1e5: a circle of solutions that vanishes at P = 0.197.
-#[test]
-fn the_range_of_a_question_is_the_size_of_its_parameter() {
-    let model = "[parameters]\nl = 0.215\np = 0\n[definitions]\nP = \"p/1e5\"\n[states]\n\
-                 x = { equation = \"-((x + 0.572 + 0.373*l)^2 + (l - 0.215 + 0.122*P)^2 - (0.197 - P))\", range = [-2, 2] }\n";
-    let study = "[[seed]]\nname = \"s\"\nstate = { x = -0.2083473 }\n[[branch]]\nname = \"e\"\nfrom = \"s\"\nfree = \"l\"\nrange = [-3, 3]\n\
-                 [[design]]\nname = \"d\"\nof = \"e\"\nwithout = \"motion\"\nleast = { p = [-1e4, 2e5] }\n";
-    let (text, code) = crate::permuted::run(model, study, "1e-6");
-    assert_eq!(code, 0, "{text}");
-    assert!(text.contains("19700.0000"), "{text}");
-}

@@ -665,9 +665,8 @@ impl Follow<'_> {
         (first, all): (bool, bool),
         cost: &mut Cost,
     ) -> Option<f64> {
-        // Apart from the middle, which may be known, no round numbers: at these a monitor may vanish exactly.
         const PLACES: [f64; 15] =
-            [0.5, 0.252, 0.747, 0.127, 0.374, 0.626, 0.873, 0.0629, 0.188, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
+            [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875, 0.0625, 0.1875, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
         let cycles = !stretch.left.mesh.is_empty();
         let count = if first && !cycles { PLACES.len() } else { 3 };
         let differ = |a: f64, b: f64| (a > 0.0) != (b > 0.0);

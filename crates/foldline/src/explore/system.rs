@@ -266,10 +266,6 @@ fn widths(model: &Model, plan: &Plan) -> Vec<f64> {
         reaches(exploration.free, exploration.range);
         exploration.connect.into_iter().for_each(|(second, range)| reaches(second, range));
     }
-    for design in &plan.designs {
-        reaches(design.vary, design.within);
-        design.along.iter().for_each(|(index, _, range)| reaches(*index, *range));
-    }
     ends.iter().map(|[low, high]| (high - low).max(0.0)).collect()
 }
 
