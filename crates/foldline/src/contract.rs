@@ -399,8 +399,8 @@ pub trait ZeroProblem {
     }
 
     /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus: its difference from that of
-    /// the exact solution at the same value of the parameter or, next to a fold, from that of the nearest solution of the
-    /// branch. `spectrum` is the result of [`ZeroProblem::examine`] at `u`, and `tangent` the
+    /// the nearest exact solution of the branch or, where the field has switches or events and no fold is near, of the one at
+    /// the same value of the parameter. `spectrum` is the result of [`ZeroProblem::examine`] at `u`, and `tangent` the
     /// unit tangent there. The last factorisation must have been near `u` on the current mesh, and is kept.
     fn spectrum_error(&mut self, _u: &[f64], _tangent: &[f64], _spectrum: &[Complex64]) -> f64 {
         f64::NAN

@@ -153,15 +153,13 @@ impl CycleProblem<'_> {
         SPECTRUM_SAFE * apart + floquet::ROUNDING
     }
 
-    /// `u` without its estimated error, at the same value of the parameter; next to a fold and where two parameters are
-    /// free, the nearest solution of the branch.
+    /// `u` without its estimated error: the nearest solution of the branch or, with switches and away from folds, the one at the
+    /// same value of the parameter. Only beside grazings do multipliers change so steeply that the difference matters.
     fn without_error(&self, u: &[f64], tangent: &[f64]) -> Vec<f64> {
         let known = self.measured.borrow();
         let Some(known) = known.as_ref() else { return vec![f64::NAN; u.len()] };
-        let back = match self.setting.freedom() {
-            1 => back_along(self, &known.shift, tangent),
-            _ => 0.0,
-        };
+        let alone = self.setting.freedom() == 1 && self.setting.field.switch_count() > 0;
+        let back = if alone { back_along(self, &known.shift, tangent) } else { 0.0 };
         u.iter().zip(&known.shift).zip(tangent).map(|((u, e), t)| u - e + back * t).collect()
     }
 
